@@ -78,6 +78,6 @@ class SynthesisData:
     rate: Fraction | None = None
     table: tuple[MetricRow, ...] = ()
     limits: RateLimits | None = None
-    cut: Literal["deadline", "interrupted"] | None = None
+    cut: Literal["deadline", "interrupted", "no_adaptation", "plan"] | None = None
     solver: SolverData | None = None
     reason: Reason | None = None

@@ -15,7 +15,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
-from tubecert.kinds import DISTANCE
+from tubecert.kinds import ALONE, DISTANCE
 from tubecert.library import plain
 from tubecert.library.asked import (
     SynthesisNumbers,
@@ -271,10 +271,16 @@ def synthesise(
         timed(progress),
         table=table,
         deadline=None if seconds is None else pipeline.Deadline.after(float(seconds)),
+        enough=content(system, objective),
     )
     if found.cut == "interrupted" and found.file is None:
         raise KeyboardInterrupt
     return SynthesisedMetric(found=found, given=Specification(spec=system))
+
+
+def content(system: Spec, objective: str | None) -> bool:
+    """Whether a tube that needs no adaptation is enough: neither an objective nor another certificate is asked for."""
+    return objective is None and system.decides in (None, ALONE.option)
 
 
 def options_of(system: Spec, numbers: SynthesisNumbers) -> pipeline.Options:

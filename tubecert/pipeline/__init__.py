@@ -26,6 +26,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.executor import Executor
 from tubecert.findings import Severity
+from tubecert.letters import ALONE
 from tubecert.metric.verify import Proofs
 from tubecert.model import domain_findings
 from tubecert.pipeline.certification import answer, result
@@ -61,21 +62,24 @@ def certify(
     memory: Memory | None = None,
     *,
     deadline: Deadline | None = None,
+    kept: Callable[[Synthesised], None] | None = None,
     workers: Executor | None = None,
     brief: bool = False,
 ) -> Result:
     """The result for a specification; raises `SpecError` for what makes the question meaningless.
 
     With a `memory` that is shared between calls, what does not depend on what changed is not proven again. `deadline`:
-    a metric that is looked for is by then the best that was found. `workers` search parts of long suprema: what comes
-    out does not depend on them. `brief`: the verdict, and the gains of what decides; no curves, no other kinds, and
-    nothing that explains.
+    a metric that is looked for is by then the best that was found, `kept` hears what there is after every attempt.
+    `workers` search parts of long suprema: what comes out does not depend on them. `brief`: the verdict, and the gains
+    of what decides; no curves, no other kinds, and nothing that explains.
     """
     question = replace(question_of(spec, options, progress, memory), workers=workers, brief=brief)
-    return result(_end(question, deadline))
+    return result(_end(question, deadline, kept))
 
 
-def _end(question: Question, deadline: Deadline | None) -> Stage | Stopped:
+def _end(
+    question: Question, deadline: Deadline | None, kept: Callable[[Synthesised], None] | None
+) -> Stage | Stopped:
     """How the certification ends."""
     spec = question.spec
     if spec.metric is not None or spec.synthesis is None:
@@ -86,6 +90,8 @@ def _end(question: Question, deadline: Deadline | None) -> Stage | Stopped:
         question.options,
         question.progress,
         deadline=deadline,
+        kept=kept,
+        enough=(question.options.conditions or spec.decides) in (None, ALONE.option),
         proofs=question.memory.proofs,
     )
     if found.cut == "interrupted":
@@ -123,12 +129,15 @@ def synthesise(
     table: bool = False,
     deadline: Deadline | None = None,
     told: Callable[[Synthesised], None] | None = None,
+    kept: Callable[[Synthesised], None] | None = None,
+    enough: bool = False,
     proofs: Proofs | None = None,
 ) -> Synthesised:
     """A proven metric for a specification, or why there is none; with `table` others over a range of rates beside it.
 
-    `told` hears why there is none before advice is looked for. At the `deadline`, and at an interruption, the best that
-    was proven by then is what comes out (`Synthesised.cut`). `proofs` of metrics are taken from there, and kept there.
+    `told` hears why there is none before advice is looked for, `kept` what there is after every attempt. At the
+    `deadline`, and at an interruption, the best that was proven by then is what comes out (`Synthesised.cut`). `proofs`
+    of metrics are taken from there, and kept there. `enough`: a metric whose tube needs no adaptation is.
     Raises `SpecError` for what makes the question meaningless, and for a solver that is not installed.
     """
     from tubecert.pipeline.synthesis import SynthesisRun  # solvers, only where they are needed
@@ -142,6 +151,15 @@ def synthesise(
     if any(item.severity is Severity.ERROR for item in findings):
         raise SpecError(findings)
     run = SynthesisRun(
-        spec, wanted, options, question_of, progress, deadline=deadline, told=told, proofs=proofs
+        spec,
+        wanted,
+        options,
+        question_of,
+        progress,
+        deadline=deadline,
+        told=told,
+        kept=kept,
+        enough=enough,
+        proofs=proofs,
     )
     return run.run(table=table)

@@ -10,15 +10,16 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite, sqrt
 from typing import Any
 
+from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Claim
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import overall
-from tubecert.kinds import DISTANCE
+from tubecert.kinds import ALONE, DISTANCE
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kind_of
-from tubecert.pipeline.certification import plan, tube
+from tubecert.pipeline.certification import defect_share, mending, plan, tube
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
 from tubecert.pipeline.width import Measure
@@ -68,7 +69,8 @@ def judged_row(row: Row, question: Question, outputs: Measure | None = None) -> 
     decisive = next((found for section in end.sections if (found := _pair(question, section.data()))), None)
     return replace(
         row,
-        served=distance.verdict is Verdict.CERTIFIED,
+        alone=by_key[ALONE.key].verdict is Verdict.CERTIFIED,
+        mend=_mend(end.enclosed) if end.verdict is not Verdict.CERTIFIED else None,
         input_gain=gain / sqrt(lower) if isfinite(gain) else None,
         rho=float(problem.rho),
         width=None if outputs is None else outputs.of(half_widths(end.enclosed)),
@@ -77,6 +79,12 @@ def judged_row(row: Row, question: Question, outputs: Measure | None = None) -> 
         bandwidth=None if decisive is None or decisive.bandwidth is None else float(decisive.bandwidth),
         demand=_demand(decisive, problem),
     )
+
+
+def _mend(enclosed: Enclosed) -> MendPlan | None:
+    """What the plan lacks, where its defect alone takes the whole tube."""
+    allowed = enclosed.tube.plan.allowance is not None  # then it is nobody's
+    return None if allowed or defect_share(enclosed.problem) < 1 else mending(enclosed)
 
 
 def _proven(question: Question, metric: VerifiedMetric) -> ProvenMetric | Stopped:
@@ -98,7 +106,7 @@ def _judged(question: Question, enclosed: Enclosed) -> Ending:
     problem = enclosed.problem
     sections = {
         key: kind_of(key).section(problem, PROPOSERS[kind_of(key).theorem.recipe].propose(problem, asked))
-        for key in dict.fromkeys([*keys, DISTANCE.key])
+        for key in dict.fromkeys([*keys, DISTANCE.key, ALONE.key])
     }
     verdict = overall([sections[key].verdict for key in keys])
     short = next((s for key in keys if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)

@@ -22,7 +22,7 @@ from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
 from tubecert.search.coordinates import Wish, propose
 from tubecert.search.proposers import PROPOSERS, Explained, Proposer
 from tubecert.spec import canonical
-from tubecert.stages.bounded import Bounded, bound
+from tubecert.stages.bounded import Bounded, Enclosed, bound
 from tubecert.stages.judged import Judged, deciding, judge_all
 from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Question, Stopped
@@ -149,17 +149,22 @@ def _advised(judged: Judged, told: list[Reason]) -> list[Reason]:
         return told  # nobody's plan: the specification allows its defect
     if all(reason.verdict is Verdict.CERTIFIED for reason in told) or share < NOTABLE:
         return told
-    tube, defect = judged.bounded.enclosed.tube, judged.bounded.problem.constants.plan_defect
-    mend = MendPlan(
-        defect=defect.above,
-        t=None if defect.at is None else defect.at.t,
-        share=share,
-        remedy=remedy(tube.plan, judged.question.model, room_of(tube.planned.metric)),
-    )
+    mend = mending(judged.bounded.enclosed)
     return [
         reason if reason.verdict is Verdict.CERTIFIED else replace(reason, relax=(*reason.relax, mend))
         for reason in told
     ]
+
+
+def mending(enclosed: Enclosed) -> MendPlan:
+    """How far the plan misses the dynamics, and what would mend it."""
+    tube, defect = enclosed.tube, enclosed.problem.constants.plan_defect
+    return MendPlan(
+        defect=defect.above,
+        t=None if defect.at is None else defect.at.t,
+        share=defect_share(enclosed.problem),
+        remedy=remedy(tube.plan, tube.question.model, room_of(tube.planned.metric)),
+    )
 
 
 def defect_share(problem: TubeProblem) -> float:

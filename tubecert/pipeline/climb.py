@@ -19,6 +19,7 @@ from tubecert.certificate.searched import RateLimit, RateLimits
 from tubecert.claims.tube import TubeInSafeSet, TubeRadius
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel
+from tubecert.pipeline.deadline import Cut
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Spec
 from tubecert.synthesis.decimals import digits_below, two_digits
@@ -26,6 +27,9 @@ from tubecert.synthesis.problem import FLOORS, Floor
 
 _DOUBLINGS, _HALVINGS = 12, 10
 _WORSE = 2  # rates in a row that are worse than the best end the climb
+_BY_PLAN = 2  # rates that fail by the plan end it,
+_NO_LESS = 0.75  # unless the second misses by less than this share of the first (twice the rate may halve it)
+_BEYOND = 8.0  # and by no more than this many tubes
 _ROUNDS = 2  # of refinement: factors of sqrt(2), then of its root
 _BELOW = 4  # the climb starts so far below the slowest mode
 _LONGER = 1.1  # times the gain is what a metric of a lower degree may ask for
@@ -42,18 +46,20 @@ class Climb:
     """What was tried: the best row of each rate, None where there is no metric.
 
     `compare` certifies a metric of a rate and a floor; at a degree that is raised as long as it pays only if `full`,
-    and not beyond `degree` otherwise.
+    and not beyond `degree` otherwise. `enough`: a tube that needs no adaptation is.
     """
 
     compare: Compare
     objective: str
+    enough: bool = False
     tried: dict[Fraction, Row | None] = field(default_factory=dict)
 
     @property
     def best(self) -> Row | None:
-        """The best row that counts."""
+        """The best row that counts; one that needs no adaptation where that is enough."""
         rows = [row for row in self.tried.values() if row is not None and row.counts]
-        return min(rows, key=self._score, default=None)
+        alone = [row for row in rows if row.alone] if self.enough else []
+        return min(alone or rows, key=self._score, default=None)
 
     @property
     def degree(self) -> int | None:
@@ -65,8 +71,10 @@ class Climb:
         """The whole search."""
         self._up(start)
         best = self.best
-        if best is None or best.rate == start:
+        if not self.ended and (best is None or best.rate == start):
             self._down(start)
+        if self.ended:
+            return
         for _ in range(_ROUNDS):
             if (best := self.best) is not None:
                 for rate in self._around(best.rate):
@@ -82,7 +90,20 @@ class Climb:
     def at(self, rate: Fraction) -> None:
         """The metrics of one rate."""
         for floor in FLOORS:
-            self._try(rate, floor, full=True)
+            if not self.ended:
+                self._try(rate, floor, full=True)
+
+    @property
+    def ended(self) -> Cut | None:
+        """Why nothing more is to be found, if that is so."""
+        rows = [row for row in self.tried.values() if row is not None]
+        if self.enough and any(row.counts and row.alone for row in rows):
+            return "no_adaptation"
+        if self.best is not None or len(rows) < _BY_PLAN:
+            return None
+        before, last = rows[-_BY_PLAN:]
+        hopeless = before.missed and last.missed >= min(_NO_LESS * before.missed, _BEYOND)
+        return "plan" if hopeless else None
 
     def limits(self) -> RateLimits | None:
         """What is against a slower and against a faster rate than the best; told of gains, not of the tube's width."""
@@ -103,7 +124,7 @@ class Climb:
         for _ in range(_DOUBLINGS):
             before = self.best
             row = self._try(rate)
-            if row is None or (before is not None and not row.counts):
+            if row is None or (before is not None and not row.counts) or self.ended:
                 return
             if row.counts:
                 worse = 0 if self.best is row else worse + 1
@@ -120,7 +141,7 @@ class Climb:
         for k in range(1, _HALVINGS + 1):
             before = self.best
             row = self._try(digits_below(start / 2**k, 3))
-            if before is not None and self.best is before:
+            if self.ended or (before is not None and self.best is before):
                 return
             if row is not None and not row.counts and not (_overshoots(row) and _rounder(row, above)):
                 return

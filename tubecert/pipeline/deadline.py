@@ -12,8 +12,8 @@ from typing import Literal
 
 from tubecert.progress import Progress, Step
 
-Cut = Literal["deadline", "interrupted"]
-"""What ended a search before its end."""
+Cut = Literal["deadline", "interrupted", "no_adaptation", "plan"]
+"""What ended a search before its end: time, somebody, a tube that needs no adaptation, a plan that no metric serves."""
 
 
 class OutOfTime(Exception):  # noqa: N818 - an end, no error

@@ -79,7 +79,8 @@ Told = Callable[["Synthesised"], None]
 class SynthesisRun:
     """One synthesis: its ladder, and the certifications that metrics are compared by.
 
-    `ask` makes a question of a specification; `told` hears a verdict before advice is looked for.
+    `ask` makes a question of a specification; `told` hears a verdict before advice is looked for, `kept` what there is
+    after every attempt; `enough`: a metric whose tube needs no adaptation is.
     """
 
     def __init__(
@@ -92,11 +93,13 @@ class SynthesisRun:
         *,
         deadline: Deadline | None = None,
         told: Told | None = None,
+        kept: Told | None = None,
+        enough: bool = False,
         proofs: Proofs | None = None,
     ) -> None:
         self.spec, self.wanted, self.options, self.ask = spec, wanted, options, ask
         self.model = build(replace(spec, metric=None))
-        self.progress, self.told = progress, told
+        self.progress, self.told, self.kept = progress, told, kept
         self.deadline = deadline or Deadline()
         self.memory = Memory(proofs=proofs or Proofs())
         whole_way = wanted.objective in ("adaptation", "tube")
@@ -123,9 +126,11 @@ class SynthesisRun:
             )
         )
         self.rows: dict[tuple[Fraction, Floor, int], Row] = {}
-        self.climb = Climb(self._compare, wanted.objective)
+        self.climb = Climb(self._compare, wanted.objective, enough and wanted.objective == "adaptation")
         self.cut: Cut | None = None
-        self.said = 0
+        self.said = self.noted = 0
+        self.known: tuple[VerifiedMetric | None, int] = (None, 0)
+        self.last: Synthesised | None = None
 
     def run(self, *, table: bool) -> Synthesised:
         """The metric that was asked for, or why there is none."""
@@ -156,21 +161,33 @@ class SynthesisRun:
 
     def _so_far(self, end: BaseException) -> VerifiedMetric | None:
         """The best of what is proven when the search is cut short; an interruption goes on if nothing was judged."""
-        self.deadline = Deadline()
-        wanted, self.cut = self.wanted, cut_by(end)
-        if wanted.objective in ("adaptation", "tube"):
-            found = self._chosen()
-        else:
-            proven = [metric for metric in self.ladder.proven if self._allowed(metric)]
-            if wanted.rate is not None:
-                proven = [metric for metric in proven if metric.rate >= wanted.rate]
-                found = min(proven, key=lambda metric: metric.condition_number.above, default=None)
-                found = found and self._at_rate(found, wanted.rate)
-            else:
-                found = max(proven, key=lambda metric: metric.rate, default=None)
+        self.deadline, self.cut = Deadline(), cut_by(end)
+        found = self._best_so_far()
         if found is None and self.cut == "interrupted" and none_certified(self._table()) is None:
             raise end
         return found
+
+    def _best_so_far(self) -> VerifiedMetric | None:
+        wanted = self.wanted
+        if wanted.objective in ("adaptation", "tube"):
+            return self._chosen()
+        proven = [metric for metric in self.ladder.proven if self._allowed(metric)]
+        if wanted.rate is None:
+            return max(proven, key=lambda metric: metric.rate, default=None)
+        proven = [metric for metric in proven if metric.rate >= wanted.rate]
+        found = min(proven, key=lambda metric: metric.condition_number.above, default=None)
+        return found and self._at_rate(found, wanted.rate)
+
+    def _keep(self) -> None:
+        """Tells what there is, as it would come out now."""
+        if self.kept is None:
+            return
+        attempts, best = tuple(self.ladder.attempts), self._best_so_far()
+        if self.last is None or (best, len(self.rows)) != self.known:
+            self.known = best, len(self.rows)
+            self.last = self._failed(tried(attempts)) if best is None else self._written(best)
+        self.last = replace(self.last, attempts=attempts)
+        self.kept(self.last)
 
     # -- objectives ------------------------------------------------------------------------------------------------
 
@@ -210,6 +227,7 @@ class SynthesisRun:
             self.climb.at(self.wanted.rate)
         else:
             self.climb.run(slow_scale(self.model, self.spec))
+        self.cut = self.climb.ended
         return self._chosen()
 
     def _chosen(self) -> VerifiedMetric | None:
@@ -229,6 +247,7 @@ class SynthesisRun:
 
     def _compare(self, rate: Fraction, floor: Floor, full: bool) -> Row | None:
         """A row for a metric of this rate; None if there is none."""
+        self._keep()
         enough = 0.0 if full else inf if self.limit is None else self.limit
         any_degree = (
             full and self.ladder.flat
@@ -339,6 +358,9 @@ class SynthesisRun:
 
     def _none(self, failure: NoneCertified) -> Synthesised:
         """Why none of the metrics certifies."""
+        if self.cut == "plan":
+            mends = [row.mend for row in self.rows.values() if row.mend is not None]
+            return self._failed(failure, *sorted(mends, key=lambda mend: mend.share)[:1])
         small = isinstance(failure.slow, TubeInSafeSet)
         return self._failed(failure, *((ReduceRadii(), EnlargeSafeSet()) if small else ()))
 
@@ -354,3 +376,6 @@ class SynthesisRun:
         if self.progress is not None:
             self.said += 1
             self.progress(replace(step, count=self.said, unit=Unit.STEPS))
+        if len(self.ladder.attempts) > self.noted:
+            self.noted = len(self.ladder.attempts)
+            self._keep()

@@ -12,7 +12,9 @@ from math import inf, log
 from tubecert.certificate.effective import Asked
 from tubecert.certificate.metric_file import MetricFile
 from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SynthesisData
+from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Claim, Reason
+from tubecert.claims.tube import PlanBounded
 from tubecert.pipeline.deadline import Cut
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
@@ -29,7 +31,8 @@ _NARROWER = 0.01  # of the tube, in its logarithm
 class Row:
     """One metric of a comparison.
 
-    `verdict` is that of the kinds that decide, `claim` what failed; `served`: certificate B holds, whatever decides.
+    `verdict` is that of the kinds that decide, `claim` what failed; `alone`: certificate 0 holds, whatever decides;
+    `mend`: what the plan lacks, if its defect alone takes the whole tube.
     `input_gain`: beta/sqrt(a) over the tube; `adaptation_rate`: the least of the distance form. `bandwidth` and
     `demand` are of the kind that decides: what it needs of the filter, and the adaptation rate. `width`: of the tube in
     the outputs that were asked for; None: its radius counts.
@@ -41,7 +44,8 @@ class Row:
     condition_number: float
     verdict: Verdict | None = None
     claim: Claim | None = None
-    served: bool = False
+    alone: bool = False
+    mend: MendPlan | None = None
     input_gain: float | None = None
     rho: float | None = None
     width: float | None = None
@@ -54,7 +58,14 @@ class Row:
     @property
     def counts(self) -> bool:
         """Whether something is certified with it."""
-        return self.verdict is Verdict.CERTIFIED or self.served
+        return self.verdict is Verdict.CERTIFIED
+
+    @property
+    def missed(self) -> float:
+        """How many times the tube the plan misses the dynamics by, where that is why nothing is certified; else 0."""
+        if isinstance(self.claim, PlanBounded):
+            return inf
+        return 0.0 if self.counts or self.mend is None else self.mend.share
 
     @property
     def idle(self) -> bool:
@@ -67,8 +78,8 @@ class Row:
         return self.counts and self.bandwidth is not None and self.bandwidth > _FAR * self.rate
 
     def score(self, objective: str) -> tuple[float, ...]:
-        """Smaller is better: certified, then by B alone, then not at all."""
-        rank = 0 if self.verdict is Verdict.CERTIFIED else 1 if self.served else 2
+        """Smaller is better; what is certified comes first."""
+        rank = 0 if self.counts else 1
         if objective == "tube":
             size = self.rho if self.width is None else self.width
             # a slower metric has to be worth it

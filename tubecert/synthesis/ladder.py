@@ -185,10 +185,11 @@ class Ladder:
             if not proposal.kappa < _POLISHES * kappa(best):
                 break
             outcome = shortest_proven(problem, proposal, best.rate, effort, self.request.proofs)
-            self._note(attempted(problem, best.rate, proposal, outcome, time.perf_counter() - started))
+            self._note(
+                attempted(problem, best.rate, proposal, outcome, time.perf_counter() - started), outcome
+            )
             if isinstance(outcome, Rejected):
                 break
-            self.proven.append(outcome)
             best = min(best, outcome, key=kappa)
         return best
 
@@ -229,13 +230,12 @@ class Ladder:
             proposal = guarded(name, route, problem)
             self.rounds += proposal.rounds
             outcome = shortest_proven(problem, proposal, rate, self.request.effort, self.request.proofs)
-            self._note(attempted(problem, rate, proposal, outcome, time.perf_counter() - started))
+            self._note(attempted(problem, rate, proposal, outcome, time.perf_counter() - started), outcome)
             if isinstance(outcome, VerifiedMetric):
                 if retreated and self.request.coordinates == "auto":
                     self._wider[degree] = (
                         _RETREAT  # at other rates, too: a proof that fails costs as much as one that holds
                     )
-                self.proven.append(outcome)
                 return outcome
             if proposal.coefficients is not None and not retreated and self.request.thorough:
                 # what was found may be no solution but for a solver's last digits: smaller ones are left to be tried
@@ -273,8 +273,10 @@ class Ladder:
             )
         return self._families[degree]
 
-    def _note(self, attempt: Attempt) -> None:
+    def _note(self, attempt: Attempt, outcome: VerifiedMetric | Rejected) -> None:
         self.attempts.append(attempt)
+        if isinstance(outcome, VerifiedMetric):
+            self.proven.append(outcome)
         if self.request.progress:
             number = attempt.condition_number
             words = attempt.outcome.tag if number is None else f"proven, condition number {number:.4g}"
