@@ -8,6 +8,7 @@ of `Processes` must be picklable.
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -16,6 +17,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from typing import Protocol, Self, TypeVar
+
+from tubecert.leash import follow
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -102,7 +105,9 @@ class Pool:
         if self._pool is None:
             self._others = set(multiprocessing.active_children())
             context = multiprocessing.get_context("spawn")  # a fork would copy the threads of BLAS half-way
-            self._pool = ProcessPoolExecutor(self.workers, mp_context=context, initializer=_leave_interrupts)
+            self._pool = ProcessPoolExecutor(
+                self.workers, mp_context=context, initializer=_leave_interrupts, initargs=(os.getpid(),)
+            )
         return self._pool
 
     def _end(self) -> None:
@@ -176,6 +181,7 @@ def chosen(workers: int, pieces: int) -> Executor:
     return Processes(min(workers, pieces)) if min(workers, pieces) > 1 else Serial()
 
 
-def _leave_interrupts() -> None:
-    """An interruption is dealt with by the command, not by each of its workers."""
+def _leave_interrupts(parent: int) -> None:
+    """An interruption is dealt with by the command, not by each of its workers; none outlives it, however it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    follow(parent)

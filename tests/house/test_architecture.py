@@ -21,6 +21,7 @@ ROOMS = [
     "findings",
     "files",
     "kept",
+    "leash",
     "executor",
     "libraries",
     "verdict",

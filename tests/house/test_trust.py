@@ -21,6 +21,7 @@ TRUSTED_ROOMS = {
     "progress",
     "printable",
     "files",
+    "leash",
     "executor",  # what workers prove is believed: they run the same program (docs/guarantee.md)
     "expression",
     "spec",

@@ -6,6 +6,7 @@ Until a command runs, nothing but typer and the error family is imported: `--hel
 | module | what it does |
 |---|---|
 | `process` | signals, and an exit code that nobody else decides on |
+| `keeper`, `telling` | a command that can be ended at any moment, and what it told by then |
 | `app` | the commands and their options |
 | `options` | the options that every command shares; numbers from the command line |
 | `targets` | files that commands write |
@@ -27,9 +28,9 @@ def main() -> None:
         from tubecert.cli import process
 
         process.prepare()
-        from tubecert.cli.app import start
+        from tubecert.cli import keeper
 
-        code = start()
+        code = keeper.kept(_work)
     except KeyboardInterrupt as stop:
         code = 130  # ExitCode.INTERRUPTED; `leave` knows the signal
         if sys.stderr is not None:
@@ -40,3 +41,9 @@ def main() -> None:
     from tubecert.cli import process
 
     process.leave(code)
+
+
+def _work() -> int:
+    from tubecert.cli.app import start
+
+    return start()

@@ -47,7 +47,7 @@ Exit codes:
   1  not certified: refuted (the report says which claim), or a check found errors
   2  the command line or an input file is invalid
   3  internal error
-  4  undecided: a budget ran out (the report says what to raise)
+  4  undecided: a budget or the time ran out (what was found until then is said)
   130  interrupted (SIGTERM: 143)
 """
 

@@ -7,15 +7,18 @@ import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tubecert import certificate
+from tubecert.cli import keeper, telling
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.report import check_pages, write_pages
 from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import plan_of, refused, spare
+from tubecert.digits import exact
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
 from tubecert.library.asked import certification_numbers, jobs_of
@@ -25,7 +28,10 @@ from tubecert.report.terminal import Terminal
 if TYPE_CHECKING:
     from tubecert.certificate.result import Result
     from tubecert.library.certification import Certification
+    from tubecert.pipeline.synthesised import Synthesised
     from tubecert.spec import Spec
+
+_OF_SEARCH: Final = Fraction(1, 2)  # of the time that is given: the certification has the rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +52,7 @@ class Given:
 def run(given: Given, output: Output) -> ExitCode:
     """Certify."""
     numbers = certification_numbers(given.numbers, flag)
+    seconds = None if numbers.deadline is None else keeper.left_of(float(numbers.deadline), interrupted=True)
     jobs = jobs_of("--jobs", given.jobs)
     radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
     settings = settings_of(given.settings, metric=given.metric, **radii)
@@ -62,20 +69,22 @@ def run(given: Given, output: Output) -> ExitCode:
         certified,  # numpy and the rest, once the input is known to be readable
     )
     from tubecert.library.workers import workers_of
-    from tubecert.report import progress
 
     workers = workers_of(jobs, given.scheduler, "--scheduler")
     options = numbers.options(conditions=given.conditions, metric=given.metric)
     command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
     terminal = Terminal.stderr(color=output.color)
-    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+    if system.metric is None and system.synthesis is not None:
+        telling.warn_of_size(system, terminal, output)
+    with telling.shown(terminal, output) as report:
         found = certified(
             system,
             options,
             report,
-            seconds=numbers.deadline,
+            seconds=None if seconds is None else Fraction(seconds) * _OF_SEARCH,
             command=command,
             workers=workers,
+            kept=telling.kept(lambda so_far: _will(so_far, kept)),
         )
     if target != certificate.STDOUT:
         certificate.write_text(target, found.text)
@@ -83,6 +92,15 @@ def run(given: Given, output: Output) -> ExitCode:
     write_pages(pages, found.certificate)
     _report(found, target, metric, pages, output)
     return found.verdict.exit_code
+
+
+def _will(found: Synthesised, target: str | None) -> keeper.Will | None:
+    """The metric that was found, if the certification does not come to its end."""
+    if target is None or found.file is None:
+        return None
+    telling.found(f"metric proven, rate {exact(found.file.rate)} 1/s: kept in {target}")
+    text = certificate.dump(found.file.to_json())
+    return {"files": {target: text}, "said": "", "code": ExitCode.UNDECIDED.value}
 
 
 def _is_data(target: str, output: Output) -> bool:

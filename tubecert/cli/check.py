@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tubecert.cli import keeper, telling
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.cli.settings import settings_of
@@ -67,6 +68,7 @@ def run(given: Given, output: Output) -> ExitCode:
     else:
         results = _of_family(paths, given.family)
     write_stdout(FORMATS[format_](results, Terminal.stdout(color=output.color), quiet=output.quiet))
+    keeper.tell({"said": True})
     if format_ == "github":
         from tubecert.report import github
 
@@ -184,12 +186,18 @@ def _checked(
     from tubecert.report import progress
 
     terminal = Terminal.stderr(color=output.color)
-    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+    with telling.shown(terminal, output) as report:
         told = None if report is None else progress.Pieces(report, Phase.CHECK, len(files))
+
+        def ready(place: int, checked: Checked) -> None:
+            telling.found(
+                f"{checked.path}: {'; '.join(each.message for each in checked.findings) or 'no findings'}"
+            )
+            if told is not None:
+                told.ready(place, checked)
+
         inner = told if isinstance(executor, Serial) else None  # other processes do not tell
-        return executor.map(
-            partial(check, options=options, progress=inner), files, None if told is None else told.ready
-        )
+        return executor.map(partial(check, options=options, progress=inner), files, ready)
 
 
 def _as_text(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:

@@ -9,7 +9,7 @@ import typer
 
 from tubecert.cli.clusters import Scheduler
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Debug, Output, Settings, with_output
+from tubecert.cli.options import Debug, Ending, Output, Settings, with_output
 
 _CHECK_AFTER = """\b
 Examples:
@@ -114,6 +114,7 @@ def check(
         bool, typer.Option("--no-cache", help="Do not use what earlier checks have found.")
     ] = False,
     gap: Annotated[str, typer.Option(metavar="NUMBER", help="As for certify; with --certify.")] = "1/100",
+    deadline: Ending = None,
     budget: Annotated[
         str | None, typer.Option(metavar="NUMBER", help="As for certify; with --certify.")
     ] = None,
@@ -126,7 +127,7 @@ def check(
     """
     if how.json and format_ not in (None, Format.JSON):
         raise typer.BadParameter("--json and --format exclude each other", ctx=context)
-    with guarded(how):
+    with guarded(how, deadline):
         from tubecert.cli.check import Given, run
 
         given = Given(

@@ -21,9 +21,14 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def guarded(output: Output) -> Iterator[None]:
-    """Turns whatever the block raises into `typer.Exit` with the right code, having told the user."""
+def guarded(output: Output, deadline: str | None = None) -> Iterator[None]:
+    """Turns whatever the block raises into `typer.Exit` with the right code, having told the user.
+
+    `deadline`: of a command that does not look at the time itself.
+    """
     try:
+        if deadline is not None:
+            _end_after(deadline)
         yield
     except typer.Exit:
         raise
@@ -48,6 +53,18 @@ def guarded(output: Output) -> Iterator[None]:
             traceback.print_exc()
         _tell(_defect(error))
         raise typer.Exit(ExitCode.INTERNAL) from None
+
+
+def _end_after(deadline: str) -> None:
+    """Has the command interrupted so many seconds after it was started; raises `SpecError` for what is no number."""
+    from tubecert.cli import keeper
+    from tubecert.library.numbers import Numbers
+
+    numbers = Numbers()
+    seconds = numbers.positive("--deadline", deadline)
+    numbers.check()
+    if seconds is not None:
+        keeper.left_of(float(seconds), interrupted=True)
 
 
 def show(error: TubecertError, output: Output) -> None:

@@ -58,14 +58,17 @@ Settings = Annotated[
 
 Budget = Annotated[str | None, number_option("--budget", "Boxes examined per claim before giving up.")]
 
-Deadline = Annotated[
+Ending = Annotated[
     str | None,
-    number_option("--deadline", "Seconds after which the best metric found so far is taken."),
+    number_option("--deadline", "Seconds after which the command ends, with what it found until then."),
 ]
 
-DesignDeadline = Annotated[
+Deadline = Annotated[
     str | None,
-    number_option("--deadline", "Seconds after which the best that is certified so far is taken."),
+    number_option(
+        "--deadline",
+        "Seconds after which the command ends, with the best metric that was found so far.",
+    ),
 ]
 
 

@@ -15,11 +15,14 @@ import sys
 from types import FrameType
 from typing import NoReturn
 
-_INTERNAL, _INTERRUPTED = 3, 130  # as in `errors.ExitCode`, which is not imported yet
+_INTERNAL, _UNDECIDED, _INTERRUPTED = 3, 4, 130  # as in `errors.ExitCode`, which is not imported yet
 _SIGNALS = ("SIGTERM", "SIGHUP")  # as SIGINT: what is half written is removed, then 128 + the signal's number
 # mallopt(3): the environment's name, the option's number, bytes
 _KEPT = (("MALLOC_MMAP_THRESHOLD_", -3, 32 << 20), ("MALLOC_TRIM_THRESHOLD_", -1, 256 << 20))
 _ENDED = b"tubecert: internal error: a library ended the process, perhaps for lack of memory"
+_ALARM = getattr(signal, "SIGALRM", None)  # sent where the time is up
+_WORDS = {signal.SIGINT: "interrupted", _ALARM: "undecided: the time was up"}
+_CODES = {_ALARM: _UNDECIDED}
 
 _received: list[int] = []
 
@@ -36,15 +39,18 @@ def prepare() -> None:
     for name in _SIGNALS:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # nohup ignores SIGHUP
-            signal.signal(number, _terminate)
+            signal.signal(number, interrupt)
     with contextlib.suppress(ImportError, OSError, AttributeError, MemoryError):
         _watch_exits()
         keep_memory()
 
 
-def _terminate(number: int, frame: FrameType | None) -> NoReturn:
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """Once: a process group and who waits for it may each pass on the same wish."""
+    del frame
     _received.append(number)
-    raise Terminated("terminated")
+    if len(_received) == 1:
+        raise Terminated(_WORDS.get(number, "terminated"))
 
 
 def _watch_exits() -> None:
@@ -88,4 +94,4 @@ def leave(code: int) -> NoReturn:
     except BaseException:
         code = code or _INTERNAL
     finally:
-        os._exit(128 + _received[0] if _received and code == _INTERRUPTED else code)
+        os._exit(_CODES.get(_received[0], 128 + _received[0]) if _received and code == _INTERRUPTED else code)

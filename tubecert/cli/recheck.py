@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+from tubecert.cli import keeper, telling
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
@@ -13,7 +14,7 @@ from tubecert.library.rechecking import text_of, told, verdict_line
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.run import BUDGET, Recheck, recheck
+from tubecert.recheck.run import BUDGET, Examined, Recheck, recheck
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,20 +33,24 @@ def run(given: Given, output: Output) -> ExitCode:
     budget = numbers.count("--budget", given.budget)
     seconds = numbers.positive("--deadline", given.deadline)
     numbers.check()
+    limit = None if seconds is None else keeper.left_of(float(seconds))
     name = given.certificate
     text = text_of(name)
     note = "" if given.spec is None else _specification(given.spec, text, name)
-    from tubecert.report import progress
     from tubecert.report.terminal import Terminal
 
     terminal = Terminal.stderr(color=output.color)
-    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:
-        report = None if show is None else told(show)
-        most, limit = BUDGET if budget is None else budget, None if seconds is None else float(seconds)
-        found = recheck(text, name, most, report, seconds=limit)
+    with telling.shown(terminal, output) as show:
+        report, most = None if show is None else told(show), BUDGET if budget is None else budget
+        found = recheck(text, name, most, report, seconds=limit, heard=_heard)
     shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
     write_stdout(shown)
+    keeper.tell({"said": True})
     return found.exit_code
+
+
+def _heard(item: Examined) -> None:
+    telling.found(_line(item.name, item.outcome, verbose=False).strip())
 
 
 def _specification(path: str, text: str, name: str) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tubecert import certificate
+from tubecert.cli import telling
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
@@ -28,7 +29,6 @@ from tubecert.library.simulating import (
 from tubecert.library.workers import cluster_at
 from tubecert.printable import visible
 from tubecert.progress import Phase, Progress, Step
-from tubecert.report import progress
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -83,14 +83,13 @@ def run(given: Given, output: Output) -> ExitCode:
 
     require_members(system, wishes, flag)
     terminal = Terminal.stderr(color=output.color)
-    wanted = not (output.no_progress or output.quiet)
-    with prepared(folder), progress.shown(terminal, wanted=wanted) as report:
+    with prepared(folder), telling.shown(terminal, output) as report:
         system, certified = _certificate(given, system, numbers, folder, report)
         campaign = campaign_of(system, certified.result, wishes, report, executor)
         if report is not None:
             report(Step(phase=Phase.FIGURES))
         files = write(folder, campaign, certificate=certified.hash)
-    _report(summary(campaign, certified.hash), folder, len(files), output)
+    _report(summary(campaign, certified.hash), folder, len(files), output, drawn=not campaign.interrupted)
     return _CODES.get(outcome(campaign), ExitCode.CERTIFIED)
 
 
@@ -119,14 +118,14 @@ def _certificate(
     return adopted(system, result), certification_of(sealed).certificate
 
 
-def _report(data: Summary, folder: str, files: int, output: Output) -> None:
+def _report(data: Summary, folder: str, files: int, output: Output, *, drawn: bool) -> None:
     """The report on stdout, or the summary as JSON, with the verdict line on stderr."""
     from tubecert.report import simulation
 
     present(
         output,
         simulation.verdict_line(data),
-        lambda: simulation.report(data, folder=folder, files=files, verbose=output.verbose),
+        lambda: simulation.report(data, folder=folder, files=files, verbose=output.verbose, drawn=drawn),
         json.dumps(data.to_json(), indent=1, sort_keys=True, allow_nan=False) + "\n" if output.json else None,
     )
 

@@ -10,7 +10,7 @@ import typer
 
 from tubecert.cli.clusters import Scheduler
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Output, Settings, SpecFile, number_option, with_output
+from tubecert.cli.options import Ending, Output, Settings, SpecFile, number_option, with_output
 from tubecert.letters import ADAPTIVE, words_of
 
 _AFTER = """\b
@@ -108,6 +108,7 @@ def simulate(
         str | None,
         typer.Option("--output", "-o", metavar="FOLDER", help="Data and figures.  [SPEC's stem.simulation]"),
     ] = None,
+    deadline: Ending = None,
     how: Output,
 ) -> None:
     """Integrate the closed loops, attack the tube, draw figures. It can falsify a certificate, never support one."""
@@ -122,7 +123,7 @@ def simulate(
     if plan is not None and (members is not None or replan is not None):
         words = "a plan of your own, or random ones: --plan, or --members and --replan"
         raise typer.BadParameter(words, ctx=context)
-    with guarded(how):
+    with guarded(how, deadline):
         from tubecert.cli.simulate import Given, run
 
         given = Given(

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tubecert import pipeline
+from tubecert.cli import telling
 from tubecert.cli.options import Output
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
@@ -19,7 +20,6 @@ from tubecert.library.sweeping import Swept, axes_of, swept
 from tubecert.library.workers import cluster_at
 from tubecert.printable import printable_json, visible
 from tubecert.records import exact_json
-from tubecert.report import progress
 from tubecert.report import sweep as told
 from tubecert.report.terminal import Terminal
 from tubecert.spec.source import read_source
@@ -63,7 +63,7 @@ def run(given: Given, output: Output) -> ExitCode:
     folder = folder if cluster is None else folder.resolve()
     task = Task(path=source.file, text=source.text, fixed=fixed, options=options, folder=folder)
     terminal = Terminal.stderr(color=output.color)
-    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+    with telling.shown(terminal, output) as report:
         found = swept(task, axes, cluster, jobs or 1, report, parquet=given.parquet)
     table = found.table
     data = printable_json(json.dumps(_rows(table), indent=1, ensure_ascii=False)) + "\n"

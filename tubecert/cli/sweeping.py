@@ -10,7 +10,7 @@ import typer
 
 from tubecert.cli.clusters import Scheduler
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Budget, Output, Settings, SpecFile, number_option, with_output
+from tubecert.cli.options import Budget, Ending, Output, Settings, SpecFile, number_option, with_output
 from tubecert.letters import ALL, words_of
 
 _AFTER = """\b
@@ -59,6 +59,7 @@ def sweep(
     ] = None,
     gap: Annotated[str, number_option("--gap", "As for certify.")] = "1/100",
     budget: Budget = None,
+    deadline: Ending = None,
     jobs: Annotated[str, typer.Option(metavar="NUMBER", help="Points certified at a time.")] = "1",
     scheduler: Scheduler = None,
     parquet: Annotated[
@@ -76,7 +77,7 @@ def sweep(
     """Certify every point of a grid of keys of a specification; a table, curves, heat maps."""
     if not over:
         raise typer.BadParameter("--over says which keys have which values", ctx=context)
-    with guarded(how):
+    with guarded(how, deadline):
         from tubecert.cli.sweep import Given, run
 
         given = Given(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tubecert import certificate
+from tubecert.cli import keeper, telling
 from tubecert.cli.options import Output, flag
-from tubecert.cli.presenting import present
+from tubecert.cli.presenting import present, text_of
 from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode
@@ -18,6 +19,9 @@ from tubecert.report.terminal import Terminal
 from tubecert.spec.synthesis import COORDINATES
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.text import Text
+
     from tubecert.pipeline.synthesised import Synthesised
     from tubecert.spec import Spec
 
@@ -43,6 +47,7 @@ class Given:
 def run(given: Given, output: Output) -> ExitCode:
     """Synthesise."""
     numbers = synthesis_numbers(given.numbers, flag)
+    deadline = deadline_after(numbers.deadline)
     radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
     settings = settings_of(given.settings, **radii)
     target = given.target if given.target is not None else f"{Path(given.spec).stem}.metric.json"
@@ -57,19 +62,21 @@ def run(given: Given, output: Output) -> ExitCode:
     spare(target, {"plan": plan_of(given.spec, system)})
     wanted = wanted_of(system, _wishes(given, numbers), flag)
     from tubecert import pipeline
-    from tubecert.library.metrics import options_of
-    from tubecert.report import progress
+    from tubecert.library.metrics import content, options_of
 
     terminal = Terminal.stderr(color=output.color)
-    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+    telling.warn_of_size(system, terminal, output)
+    with telling.shown(terminal, output) as report:
         found = pipeline.synthesise(
             system,
             wanted,
             options_of(system, numbers),
             report,
             table=given.table or bool(given.plot),
-            deadline=deadline_after(numbers.deadline),
+            deadline=deadline,
+            enough=content(system, given.objective),
             told=lambda so_far: _tell(so_far, system, terminal, output),
+            kept=telling.kept(lambda so_far: _will(so_far, system, target, output)),
         )
     if found.file is not None and target != certificate.STDOUT:
         certificate.write(target, found.file.to_json())
@@ -78,9 +85,24 @@ def run(given: Given, output: Output) -> ExitCode:
 
         certificate.write_text(given.plot, draw(found.data().table))
     _report(found, system, target, output)
+    if found.cut is not None and found.file is None:
+        keeper.tell({"said": False})  # where it was is worth a word
     if found.cut == "interrupted":
         return ExitCode.INTERRUPTED
     return found.verdict.exit_code
+
+
+def _will(found: Synthesised, system: Spec, target: str, output: Output) -> keeper.Will | None:
+    """What is left of a search that does not come to its end: the best metric, and the report about it."""
+    if found.file is None:
+        return None
+    text = certificate.dump(found.file.to_json())
+    files = {} if target == certificate.STDOUT else {target: text}
+    return {
+        "files": files,
+        "said": text_of(output, *_presented(found, system, target, output)),
+        "code": found.verdict.exit_code.value,
+    }
 
 
 def _tell(found: Synthesised, system: Spec, terminal: Terminal, output: Output) -> None:
@@ -108,12 +130,18 @@ def _wishes(given: Given, numbers: SynthesisNumbers) -> Wishes:
 
 def _report(found: Synthesised, system: Spec, target: str, output: Output) -> None:
     """The report on stdout, or the metric file, with the verdict line on stderr."""
+    present(output, *_presented(found, system, target, output))
+
+
+def _presented(
+    found: Synthesised, system: Spec, target: str, output: Output
+) -> tuple[Text, Callable[[], list[RenderableType]], str | None]:
+    """The verdict, the report and, where data are wanted, the metric file."""
     from tubecert.records import to_json
     from tubecert.report import synthesis
 
     data, file = found.data(), found.file
-    present(
-        output,
+    return (
         synthesis.verdict_line(data, file, system.name),
         lambda: synthesis.report(data, file, system, target),
         certificate.dump(to_json(data if file is None else file))

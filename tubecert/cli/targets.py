@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tubecert import certificate
+from tubecert.cli import keeper
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.spec import Spec
@@ -32,10 +33,10 @@ def spare(target: str, inputs: Mapping[str, str | Path | None]) -> None:
 
 
 def deadline_after(seconds: Fraction | None) -> Deadline | None:
-    """When a search has to come to an end, so many seconds from now."""
+    """When a search has to come to an end: so many seconds after the command was started."""
     from tubecert.pipeline import Deadline
 
-    return None if seconds is None else Deadline.after(float(seconds))
+    return None if seconds is None else Deadline.after(keeper.left_of(float(seconds)))
 
 
 def plan_of(file: str, system: Spec) -> Path | None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tubecert import certificate
+from tubecert.cli import telling
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output, flag
 from tubecert.cli.settings import settings_of
@@ -67,7 +68,7 @@ def run(given: Given, output: Output) -> ExitCode:
     shown = Terminal.stdout(color=output.color)
     found: list[tuple[str, Verified]] = []
     for case in cases:
-        with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as show:
+        with telling.shown(terminal, output) as show:
             told = (
                 None
                 if show is None

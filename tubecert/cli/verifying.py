@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tubecert.cli.guard import guarded
-from tubecert.cli.options import Budget, Output, Settings, number_option, with_output
+from tubecert.cli.options import Budget, Ending, Output, Settings, number_option, with_output
 
 _AFTER = """\b
 Examples:
@@ -49,6 +49,7 @@ def verify(
         str, number_option("--gap", "Relative width to which the largest rate is enclosed.")
     ] = "1/1000",
     budget: Budget = None,
+    deadline: Ending = None,
     output: Annotated[
         str | None,
         typer.Option(
@@ -64,7 +65,7 @@ def verify(
     how: Output,
 ) -> None:
     """Decide C1, C2, C3 of metrics on their safe sets, without plan, uncertainty or tube."""
-    with guarded(how):
+    with guarded(how, deadline):
         from tubecert.cli.verify import Given, run
 
         given = Given(

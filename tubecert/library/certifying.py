@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from fractions import Fraction
@@ -26,6 +27,7 @@ from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import Specifiable, Specification, spec_of
 from tubecert.library.workers import workers_of
 from tubecert.pipeline import Options
+from tubecert.pipeline.synthesised import Synthesised
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
 from tubecert.spec import Spec
@@ -92,16 +94,17 @@ def certified(
     *,
     seconds: Fraction | None,
     command: str,
+    kept: Callable[[Synthesised], None] | None = None,
     workers: Executor | None = None,
 ) -> Certification:
     """The sealed answer to a question; `command` is noted as its origin, `seconds` ends the search for a metric.
 
-    `workers` share long searches.
+    `kept` hears what a search for a metric has; `workers` share long searches.
     """
     started, clock = datetime.now(UTC), time.perf_counter()
     deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
-    with held(workers) as kept:
-        result = pipeline.certify(spec, options, progress, deadline=deadline, workers=kept)
+    with held(workers) as helpers:
+        result = pipeline.certify(spec, options, progress, deadline=deadline, kept=kept, workers=helpers)
     run = {
         "command": command,
         "started": started.isoformat(timespec="seconds"),

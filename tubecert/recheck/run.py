@@ -79,11 +79,12 @@ def recheck(
     *,
     seconds: float | None = None,
     to_first_failure: bool = False,
+    heard: Callable[[Examined], None] | None = None,
 ) -> Recheck:
     """Examine every claim of the certificate `text`; raises `CertificateError` for what is no certificate.
 
     `memory` keeps outcomes between certificates; `to_first_failure` leaves the rest alone once a claim has failed. What
-    is not proven after so many `seconds` is undecided, and nothing of that is kept.
+    is not proven after so many `seconds` is undecided, and nothing of that is kept. `heard` hears each outcome.
     """
     certificate = read_certificate(read(text, file))
     found: list[Examined] = []
@@ -96,6 +97,8 @@ def recheck(
                 told(0, 0.0)
             with telling(told):
                 found.append(Examined(claim.name, _TOO_LATE if time_is_up() else claim.outcome(kept)))
+            if heard is not None:
+                heard(found[-1])
             if to_first_failure and not found[-1].outcome.holds:
                 break
     return Recheck(

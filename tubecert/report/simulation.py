@@ -36,6 +36,8 @@ STYLES: Final = {
     "nothing claimed": "bold",
 }
 _CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."
+_DRAWN: Final = " and figures (PNG, SVG)"
+_NOT_DRAWN: Final = "; no figures of what was interrupted"
 _WORDS: Final = {
     "deviation": "|x - x*|",
     "distance": "d(x*, x)",
@@ -74,13 +76,16 @@ def verdict_line(data: Summary) -> Text:
     return line
 
 
-def report(data: Summary, *, folder: str, files: int, verbose: bool) -> list[RenderableType]:
-    """The whole report as renderables; `folder` holds the files."""
+def report(
+    data: Summary, *, folder: str, files: int, verbose: bool, drawn: bool = True
+) -> list[RenderableType]:
+    """The whole report as renderables; `folder` holds the files, figures among them if they were `drawn`."""
     parts: list[RenderableType] = [verdict_line(data), indented(Text(_CAVEAT))]
     for title, body in _sections(data, verbose):
         parts += titled(title, body)
     where = Text(f"{files} files ", style="bold", no_wrap=True, overflow="ignore").append(
-        f"in {folder}: summary.json, runs.npz, tables (CSV) and figures (PNG, SVG)", style="not bold"
+        f"in {folder}: summary.json, runs.npz, tables (CSV){_DRAWN if drawn else _NOT_DRAWN}",
+        style="not bold",
     )
     return [*parts, Text(), where]
 

@@ -37,6 +37,11 @@ def figures(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
                 yield from _files(name, figure)
 
 
+def figure_names() -> list[str]:
+    """The files of all figures that there may be."""
+    return [f"{name}.{kind}" for name in _drawers() for kind in FORMATS]
+
+
 def drawn(name: str, campaign: Campaign) -> Figure | None:
     """A figure by its name; None if there is nothing to draw. Raises `KeyError` for a name that is none."""
     import matplotlib as mpl

@@ -55,12 +55,21 @@ def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
     written = []
     try:
         (Path(folder) / SUMMARY).unlink(missing_ok=True)  # of earlier files, which are now replaced
+        for name in _outdated(campaign):
+            (Path(folder) / name).unlink(missing_ok=True)
         for name, data in _files(campaign, certificate):
             replace(Path(folder) / name, data)
             written.append(name)
     except OSError as error:
         raise _unwritable(folder, error) from None
     return written
+
+
+def _outdated(campaign: Campaign) -> list[str]:
+    """Earlier figures that are not replaced: to draw takes seconds, which an interruption does not leave."""
+    from tubecert.simulate.figures import figure_names
+
+    return figure_names() if campaign.interrupted else []
 
 
 def _files(campaign: Campaign, certificate: str) -> Iterator[tuple[str, bytes]]:
@@ -72,7 +81,8 @@ def _files(campaign: Campaign, certificate: str) -> Iterator[tuple[str, bytes]]:
     for attack in campaign.attacks:
         if attack.sample is not None:
             yield f"monte_carlo_{attack.loop.controller}.csv", _table(*_sample_table(campaign, attack))
-    yield from figures(campaign)
+    if not campaign.interrupted:
+        yield from figures(campaign)
     text = json.dumps(summary(campaign, certificate).to_json(), indent=1, sort_keys=True, allow_nan=False)
     yield SUMMARY, (text + "\n").encode()
 

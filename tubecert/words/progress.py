@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from tubecert.digits import near
 from tubecert.letters import NAMES
 from tubecert.progress import Phase, Step, Unit
+
+if TYPE_CHECKING:
+    from tubecert.synthesis.reach import Size
 
 COUNTED: Final = {
     Phase.CERTIFICATION: "claims",
@@ -36,6 +39,21 @@ _AT: Final = {
     Phase.FIGURES: "figures and data",
     Phase.RECHECK: "examining",
 }
+_NEXT: Final = {
+    Phase.CERTIFICATION: "a wider --gap, a smaller safe set or tube, --jobs, or more time",
+    Phase.PLAN: "a plan of your own, fewer knots, or more time",
+    Phase.GAINS: "--conditions for one certificate only, or more time",
+    Phase.ADVICE: "the verdict stands; for what would certify, more time",
+    Phase.SYNTHESIS: "a lower --rate, --degree 0, fewer --variables, a smaller safe set, or more time",
+    Phase.DESIGN: "fewer states that count, a wider --gap, or more time",
+    Phase.VERIFICATION: "a smaller safe set, a wider --gap, or more time",
+    Phase.CHECK: "fewer files, or --jobs",
+    Phase.SWEEP: "the same command goes on where it ended",
+    Phase.COMPILATION: "the same command: what is compiled is kept",
+    Phase.SIMULATION: "fewer --runs, or --controllers for some only",
+    Phase.FIGURES: "the same command once more",
+    Phase.RECHECK: "a smaller --budget tells earlier which claims are hard",
+}
 _JOINED: Final = (Phase.CERTIFICATION, Phase.GAINS)  # where the name continues the sentence
 _OF_CONSTANTS: Final = (Phase.CERTIFICATION, Phase.ADVICE, Phase.DESIGN, Phase.CHECK)
 _ONE: Final = {Unit.BOXES: "box", Unit.KNOTS: "knot", Unit.PIECES: "piece", Unit.STEPS: "step"}
@@ -48,12 +66,32 @@ def described(step: Step) -> str:
     return "; ".join(part for part in (*whole, _now(step)) if part)
 
 
+def out_of_reach(size: Size) -> str:
+    """That a search is not likely to end, and how large it is."""
+    return (
+        f"{size.states} states, and slopes that depend on {size.moving} of them: the largest search for a metric that "
+        f"was seen to end has 9, and 3. A constant W has {size.entries} unknown entries, and is proven on boxes with "
+        f"{size.vertices:,} vertices. Better: fewer states, a metric of your own, or --deadline"
+    )
+
+
+def next_step(phase: Phase) -> str:
+    """What to do where a command was ended in a phase."""
+    return _NEXT[phase]
+
+
 def duration(seconds: float) -> str:
     """A time as one reads it."""
     if seconds < 100:
         return f"{math.ceil(seconds)} s"
     minutes = seconds / 60
     return f"{round(minutes)} min" if minutes < 100 else f"{minutes / 60:.1f} h"
+
+
+def came_to(step: Step) -> str:
+    """What the search for a constant, or for gains, was seen to come to."""
+    words = f"{_name(step)}{_found(step)}" if step.phase is not Phase.GAINS else f"certificate {_name(step)}"
+    return f"{words}, {_counted(step)}" if step.count else words
 
 
 def _done(step: Step) -> str:
@@ -77,13 +115,20 @@ def _now(step: Step) -> str:
     joined = " " if step.phase in _JOINED else ": "
     words = f"{_AT[step.phase]}{joined}{name}" if name else _AT[step.phase]
     if step.count:
-        unit = str(step.unit) if step.count != 1 else _ONE[step.unit]
-        words += f", {step.count:,} {unit}"
+        words += f", {_counted(step)}"
     if step.share > 0:
         words += f", {100 * step.share:.0f} % of this part proven"
-    if math.isfinite(step.below) and math.isfinite(step.above):
-        words += f", between {near(step.below, 4)} and {near(step.above, 4)}"
-    return words
+    return words + _found(step)
+
+
+def _counted(step: Step) -> str:
+    return f"{step.count:,} {step.unit if step.count != 1 else _ONE[step.unit]}"
+
+
+def _found(step: Step) -> str:
+    if not (math.isfinite(step.below) and math.isfinite(step.above)):
+        return ""
+    return f", between {near(step.below, 4)} and {near(step.above, 4)}"
 
 
 def _name(step: Step) -> str:

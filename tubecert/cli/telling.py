@@ -1,0 +1,115 @@
+"""What a command tells while it works: to who looks at it, and to who keeps it for an end that comes from outside."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
+
+from tubecert.claims.family import Reason
+from tubecert.cli import keeper
+from tubecert.cli.options import Output
+from tubecert.digits import exact, short
+from tubecert.printable import visible
+from tubecert.progress import Phase, Progress, Step
+from tubecert.report import progress
+from tubecert.words.progress import came_to, described, next_step, out_of_reach
+
+if TYPE_CHECKING:
+    from tubecert.certificate.metric_file import MetricFile
+    from tubecert.pipeline.synthesised import Row, Synthesised
+    from tubecert.report.terminal import Terminal
+    from tubecert.spec import Spec
+
+_EVERY: Final = 0.2  # s between two of the same search
+_CLAIMS: Final = (Phase.CERTIFICATION, Phase.GAINS)  # each name is one, and is done when the next begins
+
+
+@contextlib.contextmanager
+def shown(terminal: Terminal, output: Output) -> Iterator[Progress | None]:
+    """A callback of progress: shown unless that is not wanted, and kept; None where nobody hears it."""
+    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+        yield Told(report) if keeper.told_to() else report
+
+
+@dataclass(slots=True)
+class Told:
+    """Passes steps on, and tells those that are new: where the command is, and what it found before."""
+
+    shown: Progress | None
+    last: Step | None = None
+    when: float = field(default=0.0)
+
+    def __call__(self, step: Step) -> None:
+        """A step."""
+        if self.shown is not None:
+            self.shown(step)
+        before, self.last = self.last, step
+        new = before is None or (before.phase, before.name) != (step.phase, step.name)
+        now = time.monotonic()
+        if not new and now - self.when < _EVERY:
+            return
+        self.when = now
+        if before is not None and new and before.phase in _CLAIMS:
+            found(came_to(before))
+        keeper.tell({"at": visible(described(step)), "next": next_step(step.phase)})
+
+
+class Search:
+    """Hears what a search has after every attempt: tells what was tried and judged, and what would be left."""
+
+    def __init__(self, will: Callable[[Synthesised], keeper.Will | None]) -> None:
+        self.will = will
+        self.attempts, self.rows = 0, set[tuple[object, ...]]()
+        self.file: MetricFile | None = None
+
+    def __call__(self, so_far: Synthesised) -> None:
+        """What there is."""
+        from tubecert.words.claims import outcome
+
+        for attempt in so_far.attempts[self.attempts :]:
+            found(f"rate {short(attempt.rate, 4)}, degree {attempt.degree}: {outcome(attempt.outcome)}")
+        self.attempts = len(so_far.attempts)
+        for row in so_far.rows:
+            if (key := (row.rate, row.floor, row.degree)) not in self.rows:
+                self.rows.add(key)
+                found(_judged(row))
+        if so_far.file is not self.file and (last := self.will(so_far)) is not None:
+            self.file = so_far.file
+            keeper.tell({"will": last})
+
+
+def kept(will: Callable[[Synthesised], keeper.Will | None]) -> Search | None:
+    """What hears a search; None where nobody keeps what is told."""
+    return Search(will) if keeper.told_to() else None
+
+
+def _judged(row: Row) -> str:
+    """A metric, and what a certification with it came to."""
+    from tubecert.words.claims import sentence
+
+    words = f"metric of rate {exact(row.rate)}, degree {row.degree}"
+    if row.verdict is None:
+        return words
+    if row.claim is None:
+        return f"{words}: {row.verdict}"
+    return f"{words}: {row.verdict}, {sentence(Reason(claim=row.claim, verdict=row.verdict))}"
+
+
+def warn_of_size(system: Spec, terminal: Terminal, output: Output) -> None:
+    """Says that a search is out of reach by its size, before it begins."""
+    from tubecert.model import build
+    from tubecert.synthesis.reach import beyond
+
+    if output.quiet or (size := beyond(build(replace(system, metric=None)))) is None:
+        return
+    from rich.text import Text
+
+    terminal.show(Text.assemble(("warning: ", "yellow"), out_of_reach(size)))
+
+
+def found(line: str) -> None:
+    """A result, to be told if the command is ended."""
+    keeper.tell({"found": visible(line)})
