@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from machines import alive_machine
 from test_hardware import proving, recipe, with_gain
-from tubecert.conditions.hardware import evaluated, gains, loop_of, margins_hardware, plant
 
 from tubecert.bounds.constants import GainConstants
 from tubecert.conditions import hardware
+from tubecert.conditions.hardware import evaluated, gains, loop_of, margins_hardware, plant
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Proof, check, judge

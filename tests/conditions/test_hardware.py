@@ -14,10 +14,10 @@ from hardware_oracle import given, needed, theorem
 from machines import alive_machine, asking, covariant_constants, hardware_constants, windy
 from problems import ALIVE as TUBE
 from problems import constants as tube_constants
-from tubecert.conditions.hardware import HardwareRecipe, Rounding, evaluated, loop_of, margins_hardware, plant
 
 from tubecert.bounds.constants import GainConstants, ResidualConstants
 from tubecert.conditions import hardware
+from tubecert.conditions.hardware import HardwareRecipe, Rounding, evaluated, loop_of, margins_hardware, plant
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.proposal import Proposal
 from tubecert.enclosure.constant import Constant

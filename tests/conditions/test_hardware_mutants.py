@@ -22,9 +22,9 @@ from machines import alive_machine, windy
 from problems import ALIVE as TUBE
 from problems import constants as tube_constants
 from test_hardware import BOX, FORMS, computed, numbers, proving, recipe, with_covariant
-from tubecert.conditions.hardware import HardwareRecipe, course, estimation, feedback, gains, geodesics
 
 from tubecert.bounds.constants import ResidualConstants
+from tubecert.conditions.hardware import HardwareRecipe, course, estimation, feedback, gains, geodesics
 from tubecert.conditions.problem import TubeProblem
 from tubecert.enclosure.constant import Constant
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from machines import alive_machine, asking, hardware_constants, windy
 from problems import constants, two_state
-from tubecert.conditions.hardware import margins_hardware
 from tubecert.conditions.machine import Machine
 from tubecert.kinds.hardware import HardwareData
 from tubecert.search.hardware import propose_hardware, setting_at
 from tubecert.search.lanes import Choice, Search
 
 from tubecert.conditions import hardware
+from tubecert.conditions.hardware import margins_hardware
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.kernel import Proof, check

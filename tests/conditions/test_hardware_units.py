@@ -10,9 +10,9 @@ import pytest
 from machines import covariant_constants, hardware_constants, windy
 from problems import constants as tube_constants
 from test_hardware import FORMS, proving, settled, values_of
-from tubecert.conditions.hardware import margins_hardware
 
 from tubecert.bounds.constants import TABLE
+from tubecert.conditions.hardware import margins_hardware
 
 F = Fraction
 OF_RECIPE = {

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from machines import alive_machine, windy
 from test_hardware import LOST, rounded
-from tubecert.conditions.hardware import HardwareRecipe, Rounding, WindowProof, margins_hardware
 from tubecert.conditions.hardware.course import ages_of_feedback, base_of
 from tubecert.conditions.hardware.windows import course_of
 from tubecert.conditions.machine import Window
 from tubecert.search.along import propose_in_windows
 
 from tubecert.conditions import hardware
+from tubecert.conditions.hardware import HardwareRecipe, Rounding, WindowProof, margins_hardware
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Interval
 from tubecert.kernel import Proof, check

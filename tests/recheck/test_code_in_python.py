@@ -13,8 +13,6 @@ import pytest
 from controllers import CONTROLLERS
 from flint import ctx
 from followed import bounds, covered, in_recheck, texts
-from tubecert.export import asked
-from tubecert.export import examined as export_examined
 from tubecert.export.assembly import controller_of
 from tubecert.export.examined import examined
 from tubecert.export.folder import exported
@@ -29,6 +27,8 @@ from tubecert.recheck.code.words import UnreadError
 
 from tubecert import certificate
 from tubecert.errors import ExitCode, TubecertError
+from tubecert.export import asked
+from tubecert.export import examined as export_examined
 from tubecert.library.certification import certification_of
 from tubecert.recheck.balls import exact
 

@@ -11,8 +11,6 @@ import pytest
 from controllers import CONTROLLERS
 from flint import arb, ctx
 from followed import bounds, covered, in_recheck, predicting, predicting_path, texts
-from tubecert.export import prediction as ahead
-from tubecert.export import rounding as own
 from tubecert.export.followed import DOUBLE
 from tubecert.export.rounding import rounding_of
 from tubecert.export.vectors import run, vectors
@@ -23,6 +21,8 @@ from tubecert.recheck.code.reader import read_code
 from tubecert.recheck.code.words import UnreadError
 
 from tubecert.enclosure.interval import Interval
+from tubecert.export import prediction as ahead
+from tubecert.export import rounding as own
 from tubecert.recheck.balls import between, exact
 from tubecert.recheck.terms import function, number, variable
 

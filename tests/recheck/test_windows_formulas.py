@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from hypothesis.internal.conjecture import providers
 from hypothesis.internal.constants_ast import Constants
 from test_hardware_formulas import BENT, own_reading, problems, same
-from tubecert.conditions.hardware import windows as producer
 from tubecert.conditions.hardware.loop import WindowProof
 from tubecert.conditions.machine import Window as Known
 
+from tubecert.conditions.hardware import windows as producer
 from tubecert.enclosure.constant import Constant
 from tubecert.recheck import along as own
 from tubecert.recheck.balls import exact
