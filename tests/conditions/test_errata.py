@@ -6,7 +6,6 @@ from math import pi
 
 import numpy as np
 import pytest
-from problems import three_state
 
 
 def gain(form, B):
@@ -139,8 +138,3 @@ def test_the_weak_form_of_the_distance_bound_is_not_monotone():
     sharp, weak = zip(both(0.0), both(0.4), strict=True)
     assert sharp == pytest.approx((0.528, 0.552), abs=1e-3)
     assert weak == pytest.approx((0.634, 0.580), abs=1e-3)
-
-
-def test_less_than_the_true_norm_certifies_nothing():
-    with pytest.raises(ValueError, match="2 omega"):
-        three_state(filter_factor=1)

@@ -90,14 +90,6 @@ def test_B_adds_what_the_solution_of_its_comparison_equation_reaches():
     assert shares_of(found).feedback < GAIN * 2  # the distance is below dbar
 
 
-def test_C_adds_the_largest_of_the_first_sample_and_of_all_others():
-    found = section("C", problem())
-    margin = float(found.decisive.margins["sampled"].lo)  # (dbar - max(d0, d1, sup D))/dbar
-    assert shares_of(found).feedback == pytest.approx(GAIN * 2 * (1 - margin), rel=1e-9)
-    assert shares_of(found).feedback >= GAIN * 2 * (1 - margin) * (1 - 1e-13)
-    assert Fraction(shares_of(found).adaptation) >= found.proof.recipe.projection_radius
-
-
 def test_a_start_far_off_is_what_the_feedback_answers():
     found = shares_of(section("0", problem(initial_distance=1.75)))
     assert GAIN * 1.75 <= found.feedback <= GAIN * 1.75 * ALMOST

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from tubecert.conditions.arithmetic import decay_mean, least_solution, log1p_ratio
-from tubecert.conditions.kernels import DistanceBound, kappa, paper_kernel, tight_kernel
+from tubecert.conditions.kernels import DistanceBound, kappa, tight_kernel
 from tubecert.enclosure.interval import Interval, exp
 
 RNG = np.random.default_rng(7)
@@ -51,12 +51,10 @@ def test_tight_kernel_is_the_supremum_over_time():
         J = float(tight_kernel(*map(scalar, (c, w, s0, s1))))
         assert brute <= J * (1 + 1e-9)
         assert brute * (1 + 1e-4) >= J
-        assert float(paper_kernel(*map(scalar, (c, w, s0, s1)))) * (1 + 1e-9) >= J
 
 
 def test_values_of_the_three_state_example():
     arguments = [scalar(x) for x in (2.0, 50.0, 0.1, 0.2)]
-    assert float(paper_kernel(*arguments)) == pytest.approx(4.083e-3, rel=2e-4)
     assert 0.1 * float(kappa(*arguments[:2])) + 0.2 / 100 == pytest.approx(3.749e-3, rel=2e-4)
     assert float(tight_kernel(*arguments)) == pytest.approx(2.0e-3, rel=1e-9)
 
@@ -239,9 +237,6 @@ def test_undecided_signs_widen_but_never_exclude():
         for s1 in (0.9, 1.0, 1.1):
             assert wide.contains(float(tight_kernel(*map(scalar, (1.0, 2.0, s0, s1)))))
     assert np.isfinite(wide.hi)
-    assert not np.isfinite(
-        paper_kernel(Interval(1.0, 2.0), Interval.exact(1.5), Interval.exact(1.0), Interval.exact(1.0)).hi
-    )
 
 
 def test_least_solution_is_the_least_prefixed_point():
