@@ -18,7 +18,7 @@ from tubecert.enclosure import branch_and_bound as bnb
 from tubecert.enclosure.branch_and_bound import Effort, decide, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
-from tubecert.enclosure.objective import LeastInputGain, Lipschitz, SumOfNorms
+from tubecert.enclosure.objective import Lipschitz, SumOfNorms
 from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils, WeightedPencil, Weights, scalar
 from tubecert.expression import ZERO, Expression, constant, cos, norm, parse, sin, sqrt, substitute, symbol
 from tubecert.expression.matrix import identity
@@ -87,13 +87,10 @@ CASES = {
     "inverse": (Pencil(identity(2), ((2 + x, ZERO), (ZERO, 3 + y * y))), box(x=(-1, 1), y=(0, 1)), 1),
     "pencils": (SumOfPencils([((x, ZERO), (ZERO, -2 * y)), ((y, ZERO), (ZERO, ZERO))],
                              ((constant(2), ZERO), (ZERO, constant(1)))), box(x=(-1, 1), y=(-1, 1)), 2.5),
-    "least gain": (LeastInputGain(((1 + x,), (y,)), ((constant(2), ZERO), (ZERO, constant(4)))),
-                   box(x=(0, 1), y=(-1, 1)), -0.5),
 }  # fmt: skip
 
 
 SLOW = {
-    "least gain",
     "norm on a tube",
     "difference",
 }  # linear convergence: natural, or maxima along a whole curve

@@ -22,7 +22,7 @@ from strategies import fractions
 from tubecert.bounds.feedback import tangents
 from tubecert.enclosure import taylor
 from tubecert.enclosure.metric_norm import MetricNorm
-from tubecert.enclosure.objective import LeastInputGain, SumOfNorms
+from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import Pencil, SumOfPencils, WeightedPencil, Weights, scalar
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction
@@ -441,11 +441,6 @@ def lengths(points):
     return np.sqrt((np.swapaxes(v, -1, -2) @ np.linalg.solve(at(W, points), v))[:, 0, 0])
 
 
-def input_gains(points):
-    b = at(B, points)
-    return -np.linalg.eigvalsh(np.swapaxes(b, -1, -2) @ np.linalg.solve(at(W, points), b))[:, 0]
-
-
 def projector():
     gram = multiply(transpose(B), B)
     (a, b), (_, d) = gram
@@ -463,7 +458,6 @@ USERS = {
     "inverse": (Pencil(identity(3), W), lambda p: 1 / np.linalg.eigvalsh(at(W, p))[:, 0]),
     "pencils": (SumOfPencils([F, W], multiply(W, W)), sums_of_pencils),
     "length": (MetricNorm(V, W), lengths),
-    "input gain": (LeastInputGain(B, W), input_gains),
     "projected": (ProjectedPencil(F, W, multiply(B, transpose(B)), projector(), inputs=2), projected),
 }
 
