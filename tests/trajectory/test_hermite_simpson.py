@@ -9,7 +9,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from tubecert.bounds.feedforward import rate_of
 
 from tubecert import certificate, pipeline
 from tubecert.enclosure.branch_and_bound import Effort
@@ -127,15 +126,6 @@ def test_the_defect_falls_with_the_order_of_the_method():
     )
     assert fine < coarse / 7  # of third order
     assert coarse < defect(replace(knots(), interpolation="linear")) / 2
-
-
-def test_the_steepest_input_is_at_an_end_of_a_piece():
-    data = knots(uneven=True)
-    found = rate_of(data)
-    times = np.linspace(0, 2, 401)
-    u = np.array([float(exactly(data, Fraction(float(t)))[-1]) for t in times])
-    sampled = float(np.abs(np.diff(u) / np.diff(times)).max())
-    assert sampled <= found.above <= 1.05 * sampled
 
 
 def written(folder, lines=None, spec=SPEC):
