@@ -28,11 +28,11 @@ from tubecert.model import ControlAffineModel
 from tubecert.recheck.constants import OVER_TUBE, bounded
 from tubecert.recheck.run import recheck
 
-# the machines are in test_hardware_configs.py
+# certificates for hardware and windows that are to come wait in files of their own
 CONFIGS = [
     path
     for path in sorted((Path(__file__).parents[2] / "configs").glob("*state*.yaml"))
-    if not path.stem.startswith("hardware")
+    if not path.stem.startswith("hardware") and "windows" not in path.stem
 ]
 THREE = next(path for path in CONFIGS if path.stem == "three_state")
 TWO = next(path for path in CONFIGS if path.stem == "two_state")
@@ -49,20 +49,12 @@ def shipped():
     return lambda path: rechecked.shipped(path.stem)
 
 
-@pytest.fixture
-def decided():
-    """The same; of a plan in windows what decides alone, as every kind takes a while there."""
-    return lambda path: (
-        proven.shipped(path.stem, bare=True) if "windows" in path.stem else rechecked.shipped(path.stem)
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "path", [THREE, *(pytest.param(path, marks=pytest.mark.slow) for path in CONFIGS if path != THREE)]
 )
-def test_a_shipped_certificate_is_confirmed(decided, path):
-    found = examine(decided(path))
+def test_a_shipped_certificate_is_confirmed(shipped, path):
+    found = examine(shipped(path))
     assert [claim for claim in found.claims if not claim.outcome.holds] == []
     assert found.exit_code == ExitCode.CERTIFIED
     assert len(found.claims) > 45
@@ -77,7 +69,7 @@ def test_the_bounds_of_both_arithmetics_agree_within_the_gap(shipped, path):
     refuted = 0
     with ctx.workprec(64):
         for name in OVER_TUBE:
-            side = "above" if name in ("lower", "input_gain_least") else "below"
+            side = "above" if name == "lower" else "below"
             value = getattr(constants[name], side)
             if value <= 0:
                 continue
@@ -116,7 +108,7 @@ def test_every_constant_that_is_understated_is_named(shipped):
     document, memory = shipped(THREE), {}
     examine(document, memory=memory)
     for name, entry in document["result"]["constants"].items():
-        side, factor = ("below", 1.05) if name in ("lower", "input_gain_least") else ("above", 0.95)
+        side, factor = ("below", 1.05) if name == "lower" else ("above", 0.95)
         if not entry[side] or name == "zeta_3":
             continue
         changed = copy.deepcopy(document)
@@ -140,9 +132,8 @@ def test_a_change_without_the_hash_is_contradicted(shipped):
     [
         {"at": {"x": [99.0, 99.0, 99.0]}},
         {"relax": [{"id": "turn_knob", "knob": "epsilon", "now": 0.2, "value": 0.9}]},
-        {"relax": [{"id": "lessen_cause", "cause": "noise_estimate", "share": 7.5}]},
     ],
-    ids=["at", "turn_knob", "lessen_cause"],
+    ids=["at", "turn_knob"],
 )
 def test_what_is_certified_shows_no_point_and_advises_nothing_that_would_serve(shipped, member):
     """A report would print it beside the verdict, and nobody has examined it."""
@@ -166,7 +157,7 @@ def narrow_sine(x):
     return tubecert.enclosure.interval.Interval(value.lo * 0.9, value.hi * 0.9)
 
 
-def half_filter_error(problem, n, terms, omega, p):
+def half_filter_error(n, terms, omega, p):
     gain = n.DBpx * terms.speed + (omega + p.norm) * n.DBp
     return gain * tubecert.conditions.derived.prediction_error(terms.hs, terms.s1, p.q)
 
@@ -320,15 +311,6 @@ def test_a_refuted_metric_is_confirmed_at_its_witness():
     result["verdict"] = "certified"
     with pytest.raises(TubecertError):
         examine(written(result))
-
-
-@pytest.mark.slow
-def test_as_printed_formulas_never_certify():
-    with proven.barely():
-        result = pipeline.certify(spec.load(THREE), pipeline.Options(formulas="as-printed")).to_json()
-    assert examine(written(result)).exit_code == ExitCode.UNDECIDED
-    result["verdict"] = "certified"
-    assert examine(written(result), 2_000).exit_code == ExitCode.NOT_CERTIFIED
 
 
 # -- the command -------------------------------------------------------------------------------------------------

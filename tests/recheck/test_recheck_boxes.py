@@ -7,7 +7,6 @@ import sys
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +23,7 @@ from tubecert.recheck.boxes import Field, Found
 from tubecert.recheck.clock import telling
 from tubecert.recheck.cover import Boxed, prove
 from tubecert.recheck.monomials import Combinations
-from tubecert.recheck.pencils import LeastGain, SlopesBelow
+from tubecert.recheck.pencils import SlopesBelow
 from tubecert.recheck.statements import NormsBelow, PositiveDefinite
 from tubecert.recheck.terms import number, slopes
 
@@ -226,27 +225,6 @@ def check_slopes():
         assert test.over([box[NAMES.index(v)] for v in test.variables]).proven == proven
 
 
-def check_least_gain():
-    """The smallest singular value of Theta B over a box, by eigenvalues of B'M B."""
-    W = [["2 + x**2", "0.3*x", "0"], ["0.3*x", "1.5 + sin(y)", "0.2"], ["0", "0.2", "1 + y**2"]]
-    B = [["1", "x*y"], ["0", "1 + 0.5*sin(x)"], ["y", "0.3"]]
-    box = [(0.1, 0.3), (-0.4, -0.2), (0.0, 0.0)]
-    W_s, B_s = (
-        at_points([e for row in m for e in row], samples(box)).reshape(-1, 3, width)
-        for m, width in ((W, 3), (B, 2))
-    )
-    least = np.linalg.eigvalsh(np.swapaxes(B_s, 1, 2) @ np.linalg.solve(W_s, B_s)).min() ** 0.5
-    system = SimpleNamespace(states=NAMES, inputs="uv", W=matrix(W), B=plain(B))
-    for share, proven in ((1.0001, False), (0.97, True)):
-        test = LeastGain(system, Fraction(least * share))
-        assert test.over([box[NAMES.index(v)] for v in test.variables]).proven == proven, share
-
-
-def plain(rows):
-    flat = iter(terms([e for row in rows for e in row]))
-    return [[next(flat) for _ in row] for row in rows]
-
-
 CHECKS = {
     "monomials": check_monomials,
     "expansion": check_expansion,
@@ -254,7 +232,6 @@ CHECKS = {
     "definiteness": check_definiteness,
     "signs": check_signs,
     "slopes": check_slopes,
-    "least gain": check_least_gain,
 }
 
 
@@ -292,16 +269,11 @@ def unmixed(self):
     return true_vertices(replace(self, mixed={}))
 
 
-def half_of_what_is_taken(a, b, scale=1):
-    return true_plus(a, b, Fraction(scale) / 2 if scale == -1 else scale)
-
-
 def by_trace(a):
     return true_positive(a) or bool(arb_mat(a).det() > 0 and arb_mat(a).trace() > 0)
 
 
 true_written, true_divisor = monomials._written, monomials._divisor
-true_plus = pencils.plus
 true_weight, true_vertices, true_positive = Field._weight, expansion.Expansion.vertices, is_positive
 
 BROKEN = {
@@ -314,7 +286,6 @@ BROKEN = {
     "one corner": ("norms", expansion.Expansion, "vertices", one_side),
     "one corner of a symmetric matrix": ("definiteness", expansion.Expansion, "vertices", one_side),
     "trace and determinant": ("signs", sys.modules[__name__], "is_positive", by_trace),
-    "half of the square": ("least gain", pencils, "plus", half_of_what_is_taken),
     "trace and determinant on a box": ("definiteness", statements, "is_positive", by_trace),
 }
 
@@ -370,17 +341,6 @@ def test_a_slope_that_vanishes_somewhere_has_its_part_of_what_is_left(monkeypatc
     monkeypatch.setattr(pencils, "_BENT", 0.0)
     monkeypatch.setattr(pencils, "_EVEN", 0.0)
     assert not prove(test, domain, 200).holds
-
-
-@pytest.mark.parametrize("y", [0.0, 0.7, 1.0, -3.0])
-def test_the_weights_of_a_least_gain_are_proposals_only(y, monkeypatch):
-    system = SimpleNamespace(states="x", inputs="u", W=matrix([["1 + x**2"]]), B=plain([["1"]]))
-    test = LeastGain(system, Fraction(999, 1000))
-    true_values = PositiveDefinite.with_values
-    monkeypatch.setattr(
-        PositiveDefinite, "with_values", lambda self, values: true_values(self, dict.fromkeys(values, arb(y)))
-    )
-    assert not test.over([(0.0, 0.1)]).proven  # it is 1/sqrt(1.01) at 0.1
 
 
 @settings(max_examples=40, deadline=None)

@@ -375,7 +375,7 @@ PLACES = [
     ("constants", "h", "above"),
     ("constants", "h", "below"),
     ("distance", "least_adaptation", "bandwidth"),
-    ("conditions_26", "A_m"),
+    ("conditions_26", "predictor_gain"),
     ("effort", "gap"),
     ("effort", "budget"),
     ("spec", "effective", "tube", "epsilon"),

@@ -36,7 +36,6 @@ FROM_Z = (
     "constants",
     "conditions_26",
     "distance",
-    "sampled",
     "no_adaptation",
     "proof",
     "decided_by",
@@ -114,7 +113,7 @@ def narrower(name):
 
 
 def constant(name, factor):
-    side = "below" if name in ("lower", "input_gain_least") else "above"
+    side = "below" if name == "lower" else "above"
 
     def change(result):
         own = result["constants"][name]
@@ -166,9 +165,7 @@ FAULTS = {
     },
     "a smaller d0": constant("initial_distance", 0.98),
     "in a specification without": lambda result: result["spec"]["effective"]["tube"].pop("coordinates"),
-    "with another A_m": lambda result: result["spec"]["effective"]["adaptation"].update(
-        A_m=[["-10", "0"], ["0", "-11"]]
-    ),
+    "with another A_m": lambda result: result["spec"]["effective"]["adaptation"].update(A_m="-11"),
 }
 
 

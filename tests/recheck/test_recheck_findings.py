@@ -154,11 +154,8 @@ def test_a_contraction_that_exceeds_its_rate_is_confirmed():
         .replace("0.1*sin(t) + 0.05*x", "0.1*sin(t)")
     )
     document = certified(text, conditions="distance")
-    excess = document["result"]["constants"]["contraction_excess"]
-    assert excess["above"] < 0
+    assert document["result"]["constants"]["feedback_gain"]["above"] == 0
     assert failing(examine(document)) == []
-    excess |= {"below": excess["above"] * 1.2, "above": excess["above"] * 1.1}
-    assert any("contraction_excess" in name for name in names(examine(sealed(document), 500)))
 
 
 def test_the_hash_of_the_specification_is_compared():
@@ -211,7 +208,7 @@ def not_certified(document, key, **told):
     """A section that does not decide says that it is not certified, and tells of gains all the same."""
     document = copy.deepcopy(document)
     result = document["result"]
-    other = next(name for name in ("distance", "sampled") if name != key)
+    other = next(name for name in ("distance", "conditions_26") if name != key)
     result |= {"decided_by": [other], "reasons": []}
     result["proof"].pop(key, None)
     result[key] |= {"verdict": "undecided", **told}
@@ -220,8 +217,6 @@ def not_certified(document, key, **told):
 
 NOT_CERTIFIED = {
     "A": ("conditions_26", {"adaptation_rate": 1.0, "ultimate_radius": None}),
-    "C": ("sampled", {"sample_time": 10.0, "ultimate_radius": None}),
-    "C, a radius": ("sampled", {"margin": [-1.0, 0.5], "ultimate_radius": 0.001}),
     "0, a radius": ("no_adaptation", {"ultimate_radius": 0.001}),
     "0, a margin": ("no_adaptation", {"margin": [0.9, 0.95], "ultimate_radius": None}),
 }
@@ -253,10 +248,9 @@ REST = ONE.replace("PLAN", "{kind: equilibrium, at: [0], horizon: 2}").replace("
     ("text", "asked"),
     [
         (REST + "adaptation: {A_m: -1/3}\n", {}),
-        (SMALL.replace("A_m: -10", "A_m: [[-10, 1/7], [0, -10]]"), {}),
         (REST, {"bandwidth": Fraction(100, 3), "adaptation_rate": Fraction(10**9)}),
     ],
-    ids=["A_m", "a matrix A_m", "a bandwidth"],
+    ids=["A_m", "a bandwidth"],
 )
 def test_numbers_without_a_short_decimal_are_certified_and_confirmed(text, asked):
     """S7: they ended the program."""

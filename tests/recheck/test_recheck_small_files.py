@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-import copy
-
 import pytest
-from rechecked import certified, sealed, unconfirmed
-from systems import BLOWN
 
 from tubecert.recheck.metric import adjugate, determinant
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import number, variable
-
-
-@pytest.mark.slow
-def test_a_curve_of_h_is_short():
-    """For each of its points a recipe is searched for: 30 ms, and as many of them as a file holds."""
-    document = copy.deepcopy(certified(BLOWN, bare=False, conditions="hardware"))
-    section = document["result"]["hardware"]
-    section["curve"] = [section["curve"][0]] * 3_000
-    assert unconfirmed(sealed(document))
 
 
 @pytest.mark.slow

@@ -112,32 +112,6 @@ def test_a_producer_whose_enclosures_are_too_narrow_is_caught(monkeypatch):
     assert doubted(document)
 
 
-@pytest.mark.slow
-def test_certificate_h_with_a_table_is_confirmed():
-    """Its curvature of the feedback contains the second derivative, which is largest on one side of the knot at 0.3."""
-    text = """
-tubecert: 1
-name: drag
-system:
-  states: [p, v]
-  inputs: [u]
-  tables: {drag: {points: [[-2, -2.1], [-1, -0.6], [0.3, 0.1], [1, 0.6], [2, 2.1]]}}
-  f: [v, -p - drag(v)]
-  B: [[0], [1]]
-safe_set: {p: [-1.5, 1.5], v: [-1.5, 1.5]}
-uncertainty: {h: ["0.05*sin(t) + 0.02*p"]}
-trajectory: {kind: expressions, x: ["0", "0"], u: [drag(0)], horizon: 2}
-initial_state: {at: [0, 0]}
-metric: {rate: 0.5, dual_metric: [[1, -0.6], [-0.6, 1.2]]}
-tube: {epsilon: 0.3, rho_a: 0.1}
-hardware: {rate: 500}
-"""
-    document = certified(text, conditions="hardware")
-    curvature = document["result"]["constants"]["feedback_curvature"]
-    assert curvature["below"] <= 0.675711096 * 2.195228609334393 <= curvature["above"]
-    assert failing(examine(document)) == []
-
-
 def test_one_side_of_a_knot_is_the_piece_on_that_side():
     points = (
         (Fraction(-1), Fraction(0), Fraction(1)),
