@@ -131,9 +131,9 @@ def test_a_change_without_the_hash_is_contradicted(shipped):
     "member",
     [
         {"at": {"x": [99.0, 99.0, 99.0]}},
-        {"relax": [{"id": "turn_knob", "knob": "epsilon", "now": 0.2, "value": 0.9}]},
+        {"relax": [{"id": "lower_rate", "to": 0.5}]},
     ],
-    ids=["at", "turn_knob"],
+    ids=["at", "lower_rate"],
 )
 def test_what_is_certified_shows_no_point_and_advises_nothing_that_would_serve(shipped, member):
     """A report would print it beside the verdict, and nobody has examined it."""

@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 from flint import ctx
 from rechecked import case_of, certified, digest, examine, failing, respecified, sealed, shipped
-from systems import SMALL
+from systems import SCALAR, SMALL
 
 from tubecert import spec
 from tubecert.certificate.result import Result
@@ -17,6 +17,8 @@ from tubecert.cli.belonging import ForeignError, belongs
 from tubecert.errors import ExitCode
 from tubecert.expression import number_text
 from tubecert.recheck import geodesics
+from tubecert.recheck.claims import of_certified
+from tubecert.recheck.constants import feedback_gain
 from tubecert.recheck.document import Node
 from tubecert.records import FormError
 
@@ -154,8 +156,47 @@ def test_a_contraction_that_exceeds_its_rate_is_confirmed():
         .replace("0.1*sin(t) + 0.05*x", "0.1*sin(t)")
     )
     document = certified(text, conditions="distance")
-    assert document["result"]["constants"]["feedback_gain"]["above"] == 0
+    assert document["result"]["constants"]["feedback_gain"]["above"] < 1e-11
     assert failing(examine(document)) == []
+
+
+@pytest.mark.slow
+def test_a_feedback_of_nothing_is_confirmed():
+    """W contracts at its rate by itself: F is 0, so du = 0 is a bound; of any other F it is none."""
+    own = SCALAR.replace("-x + 0.1*sin(x)", "-0.5*x").replace("0.2*sin(t)", "0.05*sin(t)")
+    document = certified(own, conditions="distance")
+    assert document["result"]["constants"]["feedback_gain"]["above"] == 0
+    assert failing(examine(document, 400)) == []
+    # of a plant that contracts more slowly than that, F is .2
+    place = case_of(certified(SCALAR.replace("-x + 0.1*sin(x)", "-0.4*x"), conditions="distance")).place
+    assert not feedback_gain(place, Fraction(0), Fraction(1)).holds
+    assert feedback_gain(place, Fraction(1), Fraction(1)).holds
+
+
+@pytest.mark.slow
+def test_outcomes_of_a_forged_certificate_are_not_those_of_another():
+    """A half-width that only a forged bound of the metric allows is not confirmed with the bound that is true."""
+    document, memory = copy.deepcopy(certified(SMALL, conditions="distance")), {}
+    document["result"]["tube"]["half_widths"]["x"] /= 2
+    forged = copy.deepcopy(document)
+    forged["result"]["constants"]["lower"] |= {"below": 1e6, "above": 1e6}
+    examine(sealed(forged), memory=memory)
+    assert any("half-width of x" in name for name, _ in failing(examine(sealed(document), memory=memory)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "resting"),
+    [("lower", "half-width"), ("h", "B: "), ("feedback_gain", "B: "), ("initial_distance", "0: ")],
+)
+def test_claims_depend_on_all_that_they_rest_on(name, resting):
+    honest = certified(SMALL, conditions="distance")
+    other = copy.deepcopy(honest)
+    other["result"]["constants"][name] |= {"below": 7.0, "above": 7.0}
+    keys, others = ({c.name: c.key for c in of_certified(case_of(x))} for x in (honest, sealed(other)))
+    found = [own for own in keys if resting in own]
+    assert found
+    assert all(keys[own] != others[own] for own in found)
 
 
 def test_the_hash_of_the_specification_is_compared():
