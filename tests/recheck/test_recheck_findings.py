@@ -9,12 +9,12 @@ from fractions import Fraction
 import pytest
 from flint import ctx
 from rechecked import case_of, certified, digest, examine, failing, respecified, sealed, shipped
-from systems import SCALAR, SMALL
+from systems import DISTURBED, SCALAR, SMALL
 
 from tubecert import spec
 from tubecert.certificate.result import Result
 from tubecert.cli.belonging import ForeignError, belongs
-from tubecert.errors import ExitCode
+from tubecert.errors import ExitCode, TubecertError
 from tubecert.expression import number_text
 from tubecert.recheck import geodesics
 from tubecert.recheck.claims import of_certified
@@ -269,6 +269,16 @@ def test_what_is_not_certified_is_not_told_as_if_it_were(case):
     """An attack: gains that do not serve, with the margins of gains that do, in a section that is not certified."""
     key, told = NOT_CERTIFIED[case]
     assert f"{case[0]}: what is told of it" in not_certified(certified(SMALL), key, **told)
+
+
+@pytest.mark.slow
+def test_a_recipe_of_a_kind_that_is_not_certified_is_refused():
+    """Nothing examines it: in a wind, of which A knows nothing, a recipe of A was confirmed with the rest."""
+    document = copy.deepcopy(certified(SMALL + DISTURBED, conditions="distance"))
+    assert failing(examine(document)) == []
+    document["result"]["proof"]["conditions_26"] = certified(SMALL)["result"]["proof"]["conditions_26"]
+    with pytest.raises(TubecertError, match="proof.conditions_26 is not known"):
+        examine(sealed(document))
 
 
 ONE = """tubecert: 1

@@ -94,6 +94,7 @@ def read_result(node: Node) -> Result:
     searched = any(key in own for key in last[2:])
     if verdict == "certified" or searched:  # the search comes last: everything else must be there
         own.require("metric", *last)
+    sections = _sections(own) if searched else None
     result = Result(
         verdict=verdict,
         specification=specification,
@@ -105,14 +106,14 @@ def read_result(node: Node) -> Result:
         assumptions=tuple(map(read_assumption, own["assumptions"].entries())),
         declared=_declared(own["declared"]),
         reasons=tuple(read_reason(item, len(states)) for item in own["reasons"].entries()),
-        recipes=_recipes(own["proof"]),
+        recipes=_recipes(own["proof"], sections),
         synthesised=own.get("synthesis", lambda item: synthesis(item, len(states))),
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, specification.plant)),
         clearance=own.get("clearance", lambda item: tuple(map(read_cleared, item.entries()))) or (),
         inputs=own.get("inputs", lambda item: tuple(map(read_limited, item.entries()))) or (),
         constants=own.get("constants", lambda item: _constants(item, own, specification)),
-        sections=_sections(own) if searched else None,
+        sections=sections,
     )
     return _complete(node, result) if verdict == "certified" else result
 
@@ -313,6 +314,8 @@ def _sections(own: Members) -> Sections:
     return Sections(read, own["decided_by"].texts())
 
 
-def _recipes(node: Node) -> dict[str, object]:
-    own = node.closed(optional=KEYS)
+def _recipes(node: Node, sections: Sections | None) -> dict[str, object]:
+    """What proves the gains of each kind that is certified; of another it would be examined by nothing."""
+    read = {} if sections is None else sections.by_key
+    own = node.closed(optional=[key for key, section in read.items() if section.verdict == "certified"])
     return {kind.key: kind.read_recipe(own[kind.key]) for kind in KINDS if kind.key in own}
