@@ -51,7 +51,7 @@ def known(value: float) -> Constant:
 
 
 def drawn(rng: np.random.Generator) -> Point:
-    """A problem in which every constant matters, and gains; some without wind, of a constant B, with a recipe that lies."""
+    """A problem in which every constant matters, and gains; some without wind, of a constant B, with a lying recipe."""
     values = {name: float(x * np.exp(rng.normal() / 3)) for name, x in ALIVE.items()}
     values["upper"] = values["lower"] * float(rng.uniform(1, 3))
     values["h_initial"] = values["h"] * float(rng.uniform(0, 1))
