@@ -15,7 +15,6 @@ Implements: theory section 2, feedback gain, closed form.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from functools import partial
 
 import numpy as np
@@ -41,7 +40,7 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
     exact = WeightedPencil(
         [model.F],
         [model.BBt, model.W],
-        Weights(variables=(MU,), ends=tangents, loss=loss, made_of=("tangents", largest)),
+        Weights(variables=(MU,), ends=tangents, loss=loss),
     )
     null = model.annihilator if model.constant_input else _moving_annihilator(model)
     if not null:
@@ -54,7 +53,7 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
     split = WeightedPencil(
         [F],
         [gram, W],
-        Weights(variables=(MU,), ends=ends, loss=loss, made_of=("down to zero", m, n, largest)),
+        Weights(variables=(MU,), ends=ends, loss=loss),
     )
     # products may hide from simplification that a variable cancels
     return FirstFinite(exact, split) if set(split.variables) <= set(exact.variables) else exact
@@ -123,11 +122,6 @@ class ClosedFormGain:
         self._B, *rest = (midrad(value) for value in inputs.at(nothing, nothing))
         self._annihilator: Ball | None = rest[0] if rest else None
         self._inputs = inputs
-
-    @property
-    def made_of(self) -> Hashable:
-        """All matrices."""
-        return self._function.made_of, self._inputs.made_of
 
     def bound(self, lo: Array, hi: Array) -> Array:
         """An upper bound over each box, (N,); inf where the box is too wide, theory 2.2."""

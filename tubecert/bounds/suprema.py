@@ -24,7 +24,7 @@ from tubecert.enclosure.constant import printable_above, printable_below
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval, fraction_bounds
 from tubecert.enclosure.objective import Objective, SumOfNorms
-from tubecert.enclosure.pencil import Pencil, SumOfPencils, scalar
+from tubecert.enclosure.pencil import Pencil, SumOfPencils
 from tubecert.expression import (
     ONE,
     ZERO,
@@ -195,11 +195,6 @@ class Suprema(Searches):
         if self.model.h is None:
             raise ValueError("h is declared by bounds, not by expressions")
         return self.model.h
-
-    def range_of(self, name: str, e: Expression) -> tuple[float, float]:
-        """Bounds of an expression over the tube, from below and from above."""
-        most, least = (self._over_tube(name, scalar(end)).above for end in (e, -e))
-        return -least, most
 
     # -- feedback ----------------------------------------------------------------------------------------------
 

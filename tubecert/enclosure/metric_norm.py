@@ -6,8 +6,6 @@ floats such that T W T' is nearly the identity. Being linear in v, the bound sta
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-
 import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval, sqrt
@@ -30,11 +28,6 @@ class MetricNorm:
     def __init__(self, v: Matrix, W: Matrix, fixed: frozenset[str] = frozenset()) -> None:
         self._function = MatrixFunction([v, W], fixed=fixed)
         self.variables = self._function.variables
-
-    @property
-    def made_of(self) -> Hashable:
-        """The matrices."""
-        return self._function.made_of
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """|T v| at the vertices plus what the rest adds, over the root of the least eigenvalue of T W T'."""

@@ -5,9 +5,9 @@ Everything here is rigorous except `Estimate.corner`, `caused` and `spread`, whi
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,16 +58,6 @@ def size_of(objective: Objective) -> int:
     return function.size if isinstance(function, MatrixFunction) else 1
 
 
-@runtime_checkable
-class Comparable(Protocol):
-    """An objective that can be told to be the same function as another one, bound by bound."""
-
-    @property
-    def made_of(self) -> Hashable:
-        """What every bound follows from, beside the class."""
-        ...
-
-
 class SumOfNorms:
     """sum_k |G_k(x)| in the spectral norm (of a column: the Euclidean norm)."""
 
@@ -75,11 +65,6 @@ class SumOfNorms:
         self._function = MatrixFunction(matrices, fixed=fixed)
         self.variables = self._function.variables
         self.is_zero = self._function.is_zero
-
-    @property
-    def made_of(self) -> Hashable:
-        """The matrices."""
-        return self._function.made_of
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """Norm of the affine part at its vertices plus the norm of the rest."""
@@ -124,12 +109,6 @@ class _Branches:
         norms = [norm for _, norm in self._norms if norm is not None]
         used = {*self._arguments.variables}.union(*(norm.variables for norm in norms))
         self.variables = tuple(sorted(used))
-
-    @property
-    def made_of(self) -> Hashable:
-        """The arguments, and the Jacobian of every choice of signs."""
-        norms = tuple((signs, None if norm is None else norm.made_of) for signs, norm in self._norms)
-        return self._arguments.made_of, norms
 
     def upper(self, variables: tuple[str, ...], lo: Array, hi: Array, target: Target) -> Estimate:
         """The largest branch of every box; corners are centres, as the Jacobian is not known on a kink."""
@@ -179,12 +158,6 @@ class Lipschitz:
         more = () if self._branches is None else self._branches.variables
         self.variables = tuple(sorted({*self._function.variables, *more}))
         self._columns = [self.variables.index(v) for v in self._function.variables]
-
-    @property
-    def made_of(self) -> Hashable:
-        """The matrices of every level, and those of the branches."""
-        branches = None if self._branches is None else self._branches.made_of
-        return self._function.made_of, tuple(self._gains), branches
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The smallest of the natural bound, the structural one and that by branches."""

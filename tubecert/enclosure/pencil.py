@@ -8,8 +8,8 @@ Everything here is rigorous except the guesses, the congruence, and what steers 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from tubecert.enclosure.linalg import (
     quadratic_form,
     whitening,
 )
-from tubecert.enclosure.objective import Comparable, Estimate, Objective, Target, edges, estimate_of
+from tubecert.enclosure.objective import Estimate, Objective, Target, edges, estimate_of
 from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
 from tubecert.expression import ONE, Expression
 from tubecert.expression.matrix import identity
@@ -42,13 +42,11 @@ class Weights:
     its entries. If N <= tau D holds, tau >= 0, for the sums with each of the E ends, it holds over the whole range of
     the variables. At a point, they are within 4e-15 of the exact ones, or those of D are 0.
     `loss(lo, hi)`: how much of D is lost by that, relative, for each variable (N, d); it only steers the search.
-    `made_of`: what tells these weights from others of the same variables.
     """
 
     variables: tuple[str, ...]
     ends: Callable[[Array, Array], Sequence[Array]]
     loss: Callable[[Array, Array], Array]
-    made_of: Hashable = field(default_factory=object)
 
 
 class Pencil:
@@ -62,11 +60,6 @@ class Pencil:
     ) -> None:
         self._function = MatrixFunction([numerator, denominator], fixed=fixed)
         self._own = self.variables = self._function.variables
-
-    @property
-    def made_of(self) -> Hashable:
-        """The matrices and their weights."""
-        return self._function.made_of, self._top, None if self._weights is None else self._weights.made_of
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """`target` where N <= target D is proven at once, else the bound that the excess over it gives."""
@@ -165,14 +158,6 @@ class FirstFinite:
         self.variables = first.variables
         self._order = [first.variables.index(v) for v in second.variables]
 
-    @property
-    def made_of(self) -> Hashable:
-        """Both; what cannot be compared is like itself only."""
-        return tuple(
-            (type(each), each.made_of) if isinstance(each, Comparable) else each
-            for each in (self._first, self._second)
-        )
-
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """The first bound, or the second."""
         found = self._first.upper(lo, hi, target)
@@ -208,11 +193,6 @@ class SumOfPencils:
     def __init__(self, numerators: Sequence[Matrix], denominator: Matrix) -> None:
         self._function = MatrixFunction([denominator, *numerators])
         self.variables = self._function.variables
-
-    @property
-    def made_of(self) -> Hashable:
-        """The matrices."""
-        return self._function.made_of
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """For each i a value is guessed at the vertices, and bounded by what +-N_i exceed it."""

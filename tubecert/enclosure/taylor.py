@@ -14,7 +14,7 @@ gradient, its derivative is expanded to first order, its second derivative not a
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -56,7 +56,6 @@ class MatrixFunction:
         self, matrices: Sequence[Matrix], order: int = 2, fixed: frozenset[str] = frozenset()
     ) -> None:
         entries = [e for matrix in matrices for row in matrix for e in row]
-        self._content = tuple(entries), order, fixed
         self.shapes = [(len(matrix), len(matrix[0])) for matrix in matrices]
         self.variables = tuple(sorted(free_symbols(entries)))
         nodes = topological(entries)
@@ -77,11 +76,6 @@ class MatrixFunction:
                 for w in self._curved[i:]:
                     curvature += derivatives(first[v], w)
         self._curvature = _Table(curvature, self.variables)
-
-    @property
-    def made_of(self) -> Hashable:
-        """What all values follow from."""
-        return (*self._content, tuple(self.shapes))
 
     @property
     def size(self) -> int:

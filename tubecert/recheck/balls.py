@@ -170,13 +170,6 @@ def sharp_norm(a: Balls) -> arb:
     return _bisected(lambda t: is_positive(_shifted(t * t, gram)), top, arb(0)).upper()
 
 
-def sharp_least(a: Balls) -> arb:
-    """A lower bound of the smallest eigenvalue of a symmetric matrix, as close as the precision allows."""
-    size = length([x for row in a for x in row]).upper()
-    minus = [[-x for x in row] for row in a]
-    return -_bisected(lambda t: is_positive(_shifted(t, minus)), 2 * size, -2 * size)
-
-
 def _shifted(t: arb, a: Balls) -> Balls:
     """t I - a."""
     return [[(t if i == j else 0) - x for j, x in enumerate(row)] for i, row in enumerate(a)]
