@@ -62,6 +62,8 @@ def test_what_it_prints_is_examined_where_another_kind_decides(calm):
     assert unconfirmed(forged)
     refuted = copy.deepcopy(other)
     refuted["result"]["no_adaptation"]["verdict"] = "refuted"
+    assert unconfirmed(refuted), "what is not certified has no recipe"
+    del refuted["result"]["proof"]["no_adaptation"]
     assert "no_adaptation.verdict" in examine(refuted).unread, "it is not examined, and that is said"
 
 

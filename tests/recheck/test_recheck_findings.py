@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 from flint import ctx
 from rechecked import case_of, certified, digest, examine, failing, respecified, sealed, shipped
-from systems import DISTURBED, SCALAR, SMALL
+from systems import BLOWN, SCALAR, SMALL
 
 from tubecert import spec
 from tubecert.certificate.result import Result
@@ -274,7 +274,7 @@ def test_what_is_not_certified_is_not_told_as_if_it_were(case):
 @pytest.mark.slow
 def test_a_recipe_of_a_kind_that_is_not_certified_is_refused():
     """Nothing examines it: in a wind, of which A knows nothing, a recipe of A was confirmed with the rest."""
-    document = copy.deepcopy(certified(SMALL + DISTURBED, conditions="distance"))
+    document = copy.deepcopy(certified(BLOWN, conditions="distance"))
     assert failing(examine(document)) == []
     document["result"]["proof"]["conditions_26"] = certified(SMALL)["result"]["proof"]["conditions_26"]
     with pytest.raises(TubecertError, match="conditions_26 is not known"):

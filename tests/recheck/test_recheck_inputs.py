@@ -5,7 +5,7 @@ import copy
 import pytest
 import tampers
 from rechecked import CONFIGS, certified, examine, failing, respecified, sealed
-from systems import SMALL
+from systems import BLOWN, SMALL
 
 from tubecert.errors import TubecertError
 
@@ -240,10 +240,7 @@ def test_the_orbit_is_confirmed_and_less_is_not():
 
 @pytest.mark.slow
 def test_wind_is_a_part_of_the_distance_that_the_feedback_answers():
-    calm, windy = (
-        certified(SMALL + extra + "limits: {u: [-4, 4]}\n", conditions="0")
-        for extra in ("", 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n')
-    )
+    calm, windy = (certified(text + "limits: {u: [-4, 4]}\n", conditions="0") for text in (SMALL, BLOWN))
     assert not failing(examine(windy))
     own, other = (bound(made["result"], "no_adaptation")["feedback"] for made in (calm, windy))
     assert other > own * 1.01

@@ -5,7 +5,7 @@ import copy
 import pytest
 import tampers
 from rechecked import CONFIGS, certified, examine, failing, respecified, sealed, unconfirmed
-from systems import DISTURBED, SMALL
+from systems import BLOWN, DISTURBED, SMALL
 
 RANGES = SMALL.replace("0.3*sin(x)", "m*sin(x)").replace(
     "  inputs: [u]", "  inputs: [u]\n  parameters: {m: [0.2, 0.4], c: [-0.01, 0.01]}"
@@ -189,13 +189,13 @@ def test_a_certificate_is_of_no_other_wind(name):
 
 @pytest.mark.slow
 def test_a_certificate_for_a_wind_is_none_without():
-    assert unconfirmed(respecified(certified(SMALL + DISTURBED), lambda e: e.pop("disturbance")))
+    assert unconfirmed(respecified(certified(BLOWN), lambda e: e.pop("disturbance")))
 
 
 @pytest.mark.slow
 def test_wind_in_the_certificates():
     """0 and B rest on what the wind does; A says that it knows of none."""
-    document, memory = certified(SMALL + DISTURBED, conditions="distance"), {}
+    document, memory = certified(BLOWN, conditions="distance"), {}
     assert failing(examine(document, memory=memory)) == []
     for section in ("no_adaptation", "distance"):
         assert document["result"][section]["verdict"] == "certified"
@@ -222,7 +222,7 @@ def test_no_certificate_of_calm_air_serves_in_wind(section, letter):
 
 @pytest.mark.slow
 def test_no_random_change_of_what_is_stated_of_a_wind_is_confirmed(monkeypatch):
-    made, fields = certified(SMALL + DISTURBED, conditions="distance"), tampers.fields
+    made, fields = certified(BLOWN, conditions="distance"), tampers.fields
     own = ("spec.effective.disturbance", "claim.wind", "proof.distance", "distance")
     monkeypatch.setattr(
         tampers,
