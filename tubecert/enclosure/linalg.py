@@ -111,11 +111,6 @@ def eigenvalues_midrad(mid: Array, rad: Array) -> Interval:
     return Interval(np.nextafter(d - radius, -np.inf), np.nextafter(d + radius, np.inf)).sanitised()
 
 
-def eigenvalues(s: Interval) -> Interval:
-    """Enclosures of the eigenvalues, ascending, of batches of symmetric interval matrices (..., n, n)."""
-    return eigenvalues_midrad(*midrad(s))
-
-
 def spectral_norm_midrad(mid: Array, rad: Array) -> Interval:
     """The largest singular value of every matrix within mid +- rad (..., p, q); shape (...,).
 

@@ -15,8 +15,6 @@ from tubecert.errors import SpecError
 from tubecert.expression import suggestion
 from tubecert.findings import Finding, NamedPlace
 from tubecert.library.numbers import Numbers
-from tubecert.library.plain import Number, number_texts
-from tubecert.pipeline.deadline import Deadline
 from tubecert.spec import Setting, Spec, Synthesis
 from tubecert.spec.synthesis import MAX_DEGREE, solver_name
 from tubecert.stages.options import Options
@@ -83,12 +81,6 @@ def effort_numbers(given: Mapping[str, str | None]) -> CertificationNumbers:
     """The same where gap and budget are all that is asked with; raises `SpecError`."""
     names = ("rho_a", "epsilon", "deadline", "bandwidth", "adaptation_rate", "gap", "budget")
     return certification_numbers({**dict.fromkeys(names), **given}, str)
-
-
-def deadline_of(seconds: Number | None) -> Deadline | None:
-    """When a search has to come to an end, so many s from now; raises `SpecError`."""
-    given = effort_numbers(number_texts(deadline=seconds)).deadline
-    return None if given is None else Deadline.after(float(given))
 
 
 def jobs_of(name: str, given: str | None) -> int | None:

@@ -50,13 +50,6 @@ def of_line(line: str, name: str, style: str, details: Sequence[tuple[str, str]]
     return render(Card(verdict=verdict, name=name, style=style, summary=summary, tables=tables))
 
 
-def of_lines(lines: Sequence[str], style: str) -> str:
-    """The card of several lines: the first says what is the matter."""
-    rows = tuple((Cell(text=line),) for line in lines[1:])
-    tables = [Table(columns=("",), rows=rows)] if rows else []
-    return render(Card(verdict=lines[0], name="", style=style, tables=tables))
-
-
 def certificate(certificate: Certificate) -> str:
     """The card of a certificate: its verdict, what it means or why it is none, and the gains of every kind."""
     result = certificate.result

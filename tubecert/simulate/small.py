@@ -68,10 +68,3 @@ def clip(s: Any, radius: float) -> None:
     if size > radius:
         for i in range(s.shape[0]):
             s[i] *= radius / size
-
-
-@compiled
-def boxed(s: Any, box: Any) -> None:
-    """Moves s to the nearest point of the box (2, m)."""
-    for i in range(s.shape[0]):
-        s[i] = min(max(s[i], box[0, i]), box[1, i])

@@ -67,10 +67,6 @@ class Setting:
         short, long = sorted((self.path, path), key=len)
         return long == short or long.startswith((f"{short}.", f"{short}["))
 
-    def covers(self, path: str) -> bool:
-        """Whether this sets the key at a path, or what it is a part of."""
-        return len(self.path) <= len(path) and self.meets(path)
-
     def __str__(self) -> str:
         return f"{self.path}={self.text}"
 

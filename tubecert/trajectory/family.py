@@ -19,7 +19,7 @@ from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.enclosure.questions import Domain
 from tubecert.expression import Expression, constant, symbol
 from tubecert.expression.matrix import Matrix
-from tubecert.model import TIME, ControlAffineModel
+from tubecert.model import ControlAffineModel
 from tubecert.trajectory.plan import Plan
 
 Ranges = tuple[tuple[Fraction, Fraction], ...]
@@ -66,10 +66,6 @@ class Family(Plan):
     def domain(self) -> Domain:
         """P and U."""
         return BoxDomain(self._ranges)
-
-    def at_times_of(self, model: ControlAffineModel) -> Domain:
-        """P and U, at all times of f: nothing of a member is known of its time."""
-        return self.domain if model.time is None else BoxDomain({**self._ranges, TIME: model.time})
 
     @cached_property
     def ranges(self) -> dict[str, Range]:

@@ -74,11 +74,6 @@ class Plan:
         """Where the variables of the plan live."""
         return BoxDomain(self.time)
 
-    def at_times_of(self, model: ControlAffineModel) -> Domain:
-        """The same, with the times of f where these are not those of the plan."""
-        del model
-        return self.domain
-
     @property
     def at_start(self) -> Plan:
         """A plan that stays at x*(0), without an input."""
