@@ -19,9 +19,7 @@ class Phase(StrEnum):
     CERTIFICATION = "certification"  # claims
     PLAN = "plan"  # claims: the planner works for a certification
     GAINS = "gains"  # claims
-    ADVICE = "advice"  # no count: what would certify is looked for
     SYNTHESIS = "synthesis"  # no count
-    DESIGN = "design"  # tubes that were tried, of nobody knows how many
     VERIFICATION = "verification"  # metrics
     CHECK = "check"  # files
     SWEEP = "sweep"  # points

@@ -155,12 +155,12 @@ class Effective:
     def at_rest(self, without: Collection[str]) -> str:
         """The text of a specification at rest at 0, for where the plan is in a file that is elsewhere.
 
-        The sections `without` are left out, and so are the windows of the tube, which are those of a plan.
+        The sections `without` are left out.
         """
         rest = {"kind": "equilibrium", "at": ["0"] * len(self.system.states)}
         if "horizon" in (own := self.part("trajectory")):  # an f that depends on t needs one
             rest["horizon"] = own["horizon"]
-        kept = {key: _timeless(key, value) for key, value in self.data.items() if key not in without}
+        kept = {key: value for key, value in self.data.items() if key not in without}
         return json.dumps(kept | {"trajectory": rest})
 
     @classmethod
@@ -177,10 +177,6 @@ class Effective:
             disturbance=view.disturbance,
             obstacles=view.obstacles,
         )
-
-
-def _timeless(key: str, section: Tree) -> Tree:
-    return {name: value for name, value in section.items() if name != "windows"} if key == "tube" else section
 
 
 def _mapping(value: Tree) -> Mapping[str, Tree]:

@@ -17,7 +17,6 @@ COUNTED: Final = {
     Phase.PLAN: "claims",
     Phase.GAINS: "claims",
     Phase.RECHECK: "claims",
-    Phase.DESIGN: "tubes",
     Phase.VERIFICATION: "metrics",
     Phase.CHECK: "files",
     Phase.SWEEP: "points",
@@ -28,9 +27,7 @@ _AT: Final = {
     Phase.CERTIFICATION: "proving",
     Phase.PLAN: "planning",
     Phase.GAINS: "gains of certificate",
-    Phase.ADVICE: "looking for what would certify",
     Phase.SYNTHESIS: "looking for a metric",
-    Phase.DESIGN: "trying tubes",
     Phase.VERIFICATION: "verifying",
     Phase.CHECK: "checking",
     Phase.SWEEP: "certifying points",
@@ -43,9 +40,7 @@ _NEXT: Final = {
     Phase.CERTIFICATION: "a wider --gap, a smaller safe set or tube, --jobs, or more time",
     Phase.PLAN: "a plan of your own, fewer knots, or more time",
     Phase.GAINS: "--conditions for one certificate only, or more time",
-    Phase.ADVICE: "the verdict stands; for what would certify, more time",
     Phase.SYNTHESIS: "a lower --rate, --degree 0, fewer --variables, a smaller safe set, or more time",
-    Phase.DESIGN: "fewer states that count, a wider --gap, or more time",
     Phase.VERIFICATION: "a smaller safe set, a wider --gap, or more time",
     Phase.CHECK: "fewer files, or --jobs",
     Phase.SWEEP: "the same command goes on where it ended",
@@ -55,7 +50,6 @@ _NEXT: Final = {
     Phase.RECHECK: "a smaller --budget tells earlier which claims are hard",
 }
 _JOINED: Final = (Phase.CERTIFICATION, Phase.GAINS)  # where the name continues the sentence
-_OF_CONSTANTS: Final = (Phase.CERTIFICATION, Phase.ADVICE, Phase.DESIGN, Phase.CHECK)
 _ONE: Final = {Unit.BOXES: "box", Unit.KNOTS: "knot", Unit.PIECES: "piece", Unit.STEPS: "step"}
 _LETTERS: Final = {name.key: name.letter for name in NAMES}
 

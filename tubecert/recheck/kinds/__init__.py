@@ -9,5 +9,5 @@ The keys are those of `tubecert.kinds`, from which nothing is imported. A new ki
 | `kind` | what every kind offers, and what its claims rest on |
 | `printed` | members that several kinds have: gains, points of a curve, margins, what is missing |
 | `bounds` | printed numbers against those of this room |
-| `alone`, `rates`, `distance`, `sampled` | 0, A, B and C |
+| `alone`, `rates`, `distance` | 0, A and B |
 """
