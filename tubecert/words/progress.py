@@ -49,6 +49,7 @@ _NEXT: Final = {
     Phase.FIGURES: "the same command once more",
     Phase.RECHECK: "a smaller --budget tells earlier which claims are hard",
 }
+_OF_CONSTANTS: Final = (Phase.CERTIFICATION, Phase.CHECK)
 _JOINED: Final = (Phase.CERTIFICATION, Phase.GAINS)  # where the name continues the sentence
 _ONE: Final = {Unit.BOXES: "box", Unit.KNOTS: "knot", Unit.PIECES: "piece", Unit.STEPS: "step"}
 _LETTERS: Final = {name.key: name.letter for name in NAMES}
