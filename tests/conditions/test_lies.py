@@ -1,0 +1,276 @@
+"""Recipes of 0, A and B that lie, one number at a time: the kernel certifies what an oracle in 60 digits does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from decimal import Decimal
+from fractions import Fraction
+from functools import cache
+from itertools import combinations, permutations
+from math import inf
+from typing import Any
+
+import gains_oracle as oracle
+import pytest
+from gains_oracle import CLOSE
+from problems import ALIVE, alive, scalar_predictor, two_state
+
+from tubecert.bounds.constants import ResidualConstants, WindConstants
+from tubecert.conditions.alone import NoGains
+from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.problem import TubeProblem, Wind
+from tubecert.conditions.proposal import Asked, Proposal
+from tubecert.conditions.rates import RateRecipe
+from tubecert.conditions.verdict import Verdict
+from tubecert.enclosure.constant import Constant
+from tubecert.kernel import NotProvenError, Proof, check, judge, theorem_of
+from tubecert.kinds.table import kind_of
+from tubecert.search.distance import recipe_at
+from tubecert.search.proposers import PROPOSERS
+
+F = Fraction
+PRINTED = 1 + 1e-8  # what is printed is rounded up
+KINDS = {"0": NoGains, "A": RateRecipe, "B": DistanceRecipe}
+NUMBERS = {
+    kind: tuple(item.name for item in fields(recipe) if item.name not in ("settling", "windows"))
+    for kind, recipe in KINDS.items()
+}
+
+
+def exactly(x: float) -> Constant:
+    return Constant(below=x, above=x)
+
+
+def wind(bound: str | None, *, size: float = 0.2, explained: float = 0.1) -> Wind:
+    own = WindConstants(push=exactly(0.15), size=exactly(size), explained=exactly(explained))
+    return Wind(bound=None if bound is None else F(bound), constants=own)
+
+
+REST = ResidualConstants(push=exactly(0.02), size=exactly(0.03))
+TURNING = {"B_x": 0.05, "B_pinv_x": 0.02}
+WIDE = {name: (x, 1.01 * x) if name == "lower" else (0.99 * x, x) for name, x in ALIVE.items()}
+# each with the kinds that are proven for it
+PROBLEMS: dict[str, tuple[TubeProblem, str]] = {
+    "every term alive": (alive(), "0AB"),
+    "constants that are enclosed": (alive(values=WIDE), "0AB"),
+    "any predictor": (alive(A_m=None), "0AB"),
+    "a smooth projection": (alive(smooth=F(1, 4)), "0AB"),
+    "a short horizon": (alive(horizon=F(1, 5)), "0AB"),
+    "a plan that ends": (two_state(horizon=F(3)), "AB"),
+    "B turns": (two_state(values=TURNING), "AB"),
+    "a wind, B turns": (two_state(values=TURNING, wind=wind("0.05"), residual=REST), "B"),
+    "a wind": (
+        two_state(values={"h": 0.9}, wind=wind("0.2"), residual=REST, A_m=scalar_predictor("40", 2)),
+        "B",
+    ),
+    "a wind that nothing is left of": (two_state(wind=wind("0")), "AB"),
+    "a wind that is looked for": (two_state(wind=wind(None)), ""),
+    "parameters that are unknown": (two_state(residual=REST), "B"),
+}
+OF_GAINS = (F(200), F(10**9), F(40))  # where a search has nothing to say
+
+
+@cache
+def honest(name: str, kind: str) -> Any:
+    """What the search hands over; where it has no answer, gains that would do for a problem like it."""
+    problem, proven = PROBLEMS[name]
+    if kind in proven:
+        return PROPOSERS[KINDS[kind]].propose(problem, Asked(curve=False)).decisive
+    omega, Gamma, g = OF_GAINS
+    if kind == "0":
+        return NoGains()
+    if kind == "B":
+        return recipe_at(problem, omega, Gamma, g)
+    R_H = problem.projection_radius
+    return RateRecipe(bandwidth=omega, adaptation_rate=Gamma, predictor_gain=g, projection_radius=R_H)
+
+
+def agrees(problem: TubeProblem, recipe: Any, words: object = "") -> bool:
+    """Whether a recipe is proven, which has to be what the oracle says of it, with its margins, radius and inputs."""
+    true, found = oracle.margins(problem, recipe), check(problem, recipe)
+    if not isinstance(found, Proof):
+        assert oracle.left(true) <= CLOSE, words
+        return False
+    assert oracle.left(true) > 0, words
+    for claim, margin in found.margins.items():
+        assert true[claim] - CLOSE <= margin.lo <= true[claim] <= margin.hi, (words, claim)
+    own, shares = oracle.claims(problem, recipe), found.input_shares
+    assert (shares is None) == (own.feedback == inf), words
+    if shares is not None:
+        assert own.feedback <= shares.feedback <= own.feedback * PRINTED, words
+        assert own.adaptation <= F(shares.adaptation) <= own.adaptation * F(PRINTED), words
+    assert (own.radius is None) == (found.ultimate_radius is None), words
+    assert own.radius is None or own.radius <= found.ultimate_radius <= own.radius * PRINTED, words
+    return True
+
+
+# -- one number, or two, that lie
+
+FACTORS = tuple(
+    map(F, "-1 0 1e-30 1e-3 0.1 0.5 0.9 0.99 0.999 0.999999 1.000001 1.001 1.1 2 10 1000 1e30".split())
+)
+CASES = [(name, kind) for name in PROBLEMS for kind in KINDS]
+
+
+def told(recipe: Any, kind: str) -> Iterator[tuple[str, Any]]:
+    """Every number of a recipe replaced by another one; and pairs of them, which may hide each other."""
+    names = NUMBERS[kind]
+    for name in names:
+        for factor in FACTORS:
+            yield f"{name} times {float(factor):g}", replace(recipe, **{name: getattr(recipe, name) * factor})
+    for first, second in combinations(names, 2):
+        for factor in map(F, ("0.99", "0.1", "10", "-1")):
+            changed = {name: getattr(recipe, name) * factor for name in (first, second)}
+            yield f"{first} and {second} times {float(factor):g}", replace(recipe, **changed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_numbers_that_lie_are_certified_where_they_prove_the_theorem_all_the_same(name, kind):
+    (problem, proven), recipe = PROBLEMS[name], honest(name, kind)
+    assert agrees(problem, recipe, "the truth") == (kind in proven)
+    found = [agrees(problem, lie, words) for words, lie in told(recipe, kind)]
+    if kind != "0":
+        assert any(found) == (kind in proven)
+        assert not all(found)
+
+
+# -- a recipe for something else
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_recipe_for_another_problem_is_certified_where_it_proves_the_theorem_all_the_same(kind):
+    found = [
+        agrees(PROBLEMS[name][0], honest(other, kind), (name, other)) for name, other in permutations(PROBLEMS, 2)
+    ]
+    assert any(found)
+    assert not all(found)
+
+
+MOVED = sorted(ALIVE)
+PARTS = {"rate": F("0.97"), "epsilon": F(2), "rho_a": F("0.9"), "rho_r": F("0.97")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_recipe_for_a_milder_problem_is_certified_where_it_proves_the_theorem_all_the_same(kind):
+    """Every constant and every radius, a little and much worse than it was for the search."""
+    name = "every term alive"
+    problem, recipe = PROBLEMS[name][0], honest(name, kind)
+    for constant in MOVED:
+        for factor in (0.5, 0.99, 1.01, 3.0, inf):
+            moved = {constant: exactly(ALIVE[constant] * factor)}
+            other = replace(problem, constants=replace(problem.constants, **moved))
+            agrees(other, recipe, (constant, factor))
+    for part, factor in PARTS.items():
+        agrees(replace(problem, **{part: getattr(problem, part) * factor}), recipe, part)
+    for T in map(F, ("0.01", "0.1", "1", "10")):
+        agrees(replace(problem, horizon=T), recipe, T)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_recipe_of_another_kind_proves_nothing(kind):
+    problem = PROBLEMS["every term alive"][0]
+    theorem = theorem_of(KINDS[kind])
+    for other in KINDS:
+        recipe = honest("every term alive", other)
+        judgement = judge(problem, theorem, Proposal(decisive=recipe, beside={"beside": recipe}, curve=(recipe,)))
+        assert (judgement.verdict is Verdict.CERTIFIED) == (kind == other)
+        assert bool(judgement.beside) == bool(judgement.curve) == (kind == other)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_only_looks_like_a_recipe_proves_nothing(kind):
+    problem, recipe = PROBLEMS["every term alive"][0], honest("every term alive", kind)
+    alike = type("Alike", (KINDS[kind],), {})
+    for lie in (alike(**{item.name: getattr(recipe, item.name) for item in fields(recipe)}), object(), KINDS[kind]):
+        judgement = judge(problem, theorem_of(KINDS[kind]), Proposal(decisive=lie))
+        assert judgement.verdict is Verdict.UNDECIDED
+        assert judgement.decisive is None
+
+
+NO_NUMBERS = (None, float("nan"), inf, -inf, 20.0, 20, True, "20", Decimal(20), 20 + 0j)
+
+
+@pytest.mark.parametrize("kind", "AB")
+def test_what_is_no_exact_decimal_proves_nothing(kind):
+    problem, recipe = PROBLEMS["any predictor"][0], honest("any predictor", kind)
+    for name in NUMBERS[kind]:
+        for lie in NO_NUMBERS:
+            told = replace(recipe, **{name: lie})
+            judgement = judge(problem, theorem_of(KINDS[kind]), Proposal(decisive=told, beside={"beside": told}))
+            assert judgement.verdict is Verdict.UNDECIDED, (name, lie)
+            assert judgement.decisive is None
+            assert not judgement.beside
+
+
+@pytest.mark.parametrize("kind", "AB")
+def test_another_predictor_than_was_asked_for_proves_nothing(kind):
+    problem, recipe = PROBLEMS["every term alive"][0], honest("every term alive", kind)
+    free = PROBLEMS["any predictor"][0]
+    for g in (problem.predictor_gain * F("1.000001"), F(20)):
+        other = replace(recipe, predictor_gain=g, adaptation_rate=F(10) ** 12)
+        assert isinstance(check(free, other), Proof)
+        assert not isinstance(check(problem, other), Proof)
+
+
+# -- a proposal that is true in one place and lies in another
+
+
+def lies_beside(kind: str) -> Iterator[Any]:
+    """What proves nothing, for any of the reasons that there are."""
+    problem, recipe = PROBLEMS["every term alive"][0], honest("every term alive", kind)
+    for factor in (F("0.999"), F("0.9"), F(-1)):
+        for name in NUMBERS[kind]:
+            lie = replace(recipe, **{name: getattr(recipe, name) * factor})
+            if not oracle.proves(problem, lie):
+                yield lie
+
+
+@pytest.mark.parametrize("kind", "AB")
+def test_of_what_stands_beside_only_what_is_proven_is_kept(kind):
+    problem, recipe = PROBLEMS["every term alive"][0], honest("every term alive", kind)
+    theorem = theorem_of(KINDS[kind])
+    lies = tuple(lies_beside(kind))
+    assert len({type(lie) for lie in lies}) == 1
+    assert len(lies) >= 8
+    named = {f"lie {k}": lie for k, lie in enumerate(lies)} | {"truth": recipe}
+    judgement = judge(problem, theorem, Proposal(decisive=recipe, role="asked", beside=named))
+    assert judgement.verdict is Verdict.CERTIFIED
+    assert set(judgement.beside) == {"truth"}
+    for lie in lies:
+        judgement = judge(problem, theorem, Proposal(decisive=recipe, curve=(recipe, lie), around=(recipe, lie)))
+        assert set(judgement.curve) <= {recipe}
+        for claim, lows in judgement.around.items():
+            for at, low in zip(judgement.around_at, lows, strict=True):
+                assert low <= oracle.margins(problem, at).get(claim, -inf)
+        # and the lie decides: what is true beside it does not help
+        judgement = judge(problem, theorem, Proposal(decisive=lie, beside={"least_adaptation": recipe}, curve=(recipe,)))
+        assert judgement.verdict is not Verdict.CERTIFIED
+        assert judgement.ultimate_radius is None
+        assert judgement.proof is None
+
+
+@pytest.mark.parametrize("kind", "AB")
+def test_a_curve_is_about_the_projection_of_the_gains_that_it_is_printed_with(kind):
+    """Points of a curve are printed without a radius: that of the pair is theirs."""
+    problem, recipe = PROBLEMS["every term alive"][0], honest("every term alive", kind)
+    wide = replace(recipe, projection_radius=recipe.projection_radius * 4)
+    mild = replace(problem, epsilon=problem.epsilon)
+    told = judge(mild, theorem_of(KINDS[kind]), Proposal(decisive=wide, curve=(recipe,), around=(recipe,)))
+    assert told.curve == ()
+    assert told.around_at == ()
+
+
+@pytest.mark.parametrize("kind", "AB")
+def test_margins_around_are_about_the_rate_and_the_predictor_that_they_are_printed_with(kind):
+    problem, recipe = PROBLEMS["any predictor"][0], honest("any predictor", kind)
+    for other in (
+        replace(recipe, adaptation_rate=recipe.adaptation_rate * 100),
+        replace(recipe, predictor_gain=recipe.predictor_gain * F("1.001"), adaptation_rate=recipe.adaptation_rate * 2),
+    ):
+        assert oracle.proves(problem, other)
+        told = judge(problem, theorem_of(KINDS[kind]), Proposal(decisive=recipe, around=(recipe, other)))
+        assert told.around_at in ((), (recipe,))
