@@ -31,6 +31,9 @@ THEOREMS: Final[Mapping[type, Theorem[Any]]] = {
 }
 
 
+_BESIDE_BANDWIDTH: Final = ("adaptation_rate", "predictor_gain", "projection_radius")
+
+
 def theorem_of(recipe: type[R]) -> Theorem[R]:
     """The theorem that a kind of recipe is for; `KeyError` if the kernel knows none."""
     return THEOREMS[recipe]
@@ -186,21 +189,27 @@ def judge(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> J
 
 
 def _about(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> Proposal[R]:
-    """What of a proposal is about this theorem and this loop; the rest is as if it had not been proposed."""
+    """What of a proposal is about this theorem and this loop; the rest is as if it had not been proposed.
+
+    A curve has the projection that is printed for a pair alone; what is around a pair differs in its bandwidth alone.
+    """
 
     def kept(recipe: R | None) -> R | None:
         return recipe if recipe is not None and theorem.states(problem, recipe) else None
 
-    def those(recipes: Iterable[R]) -> tuple[R, ...]:
-        return tuple(recipe for recipe in recipes if theorem.states(problem, recipe))
+    def those(recipes: Iterable[R], *names: str) -> tuple[R, ...]:
+        return tuple(r for r in recipes if theorem.states(problem, r) and _same(pair, r, *names))
 
+    decisive = kept(proposal.decisive)
+    beside = {role: r for role, r in proposal.beside.items() if theorem.states(problem, r)}
+    pair = next((r for r in (decisive, *beside.values()) if r is not None), None)
     return replace(
         proposal,
-        decisive=kept(proposal.decisive),
+        decisive=decisive,
         hopeless=kept(proposal.hopeless),
-        beside={role: r for role, r in proposal.beside.items() if theorem.states(problem, r)},
-        curve=those(proposal.curve),
-        around=those(proposal.around),
+        beside=beside,
+        curve=those(proposal.curve, "projection_radius"),
+        around=those(proposal.around, *_BESIDE_BANDWIDTH),
     )
 
 
@@ -250,14 +259,14 @@ def _ultimate(problem: TubeProblem, decisive: Checked[R], proposal: Proposal[R])
     """What is proven of the long run at the decisive gains, by their own theorem or by the companion's."""
     if theorem_of(type(decisive.recipe)).ultimate is not None:
         return decisive.ultimate_radius
-    if type(proposal.companion) not in THEOREMS or not _same_gains(decisive.recipe, proposal.companion):
+    same = _same(decisive.recipe, proposal.companion, "bandwidth", *_BESIDE_BANDWIDTH)
+    if type(proposal.companion) not in THEOREMS or not same:
         return None
     return check(problem, proposal.companion).ultimate_radius
 
 
-def _same_gains(first: object, second: object) -> bool:
-    """Whether two recipes are about the same loop."""
-    names = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
+def _same(first: object, second: object, *names: str) -> bool:
+    """Whether two recipes are about loops that have these gains in common."""
     return all(getattr(first, name, None) == getattr(second, name, None) for name in names)
 
 
