@@ -1,8 +1,8 @@
-"""Theorems 0, A and B once more, in 60 digits: an oracle for what searches hand over, and a judge of what they may.
+"""Theorems 0, A and B once more, in 60 digits: what is true of the recipes that searches hand over.
 
-Written from the theory alone (sections 3, 4, 4a, 7), not from the code: sup D by its one stationary point, the kernel J as
-a sup D, every constant on the side that bounds it. Nothing is rounded outward; so a proof has to be one here without any
-tolerance, and what is not one here by less than a billionth may be told either way.
+Written from the theory alone (sections 3, 4, 4a, 7), not from the code: sup D by its one stationary point, the kernel J
+as a sup D, every constant on the side that bounds it. Nothing is rounded outward: so a proof has to be one here without
+any tolerance; where no more than `CLOSE` is left, it need not be one.
 """
 
 from __future__ import annotations
@@ -227,9 +227,10 @@ def rates(n: Given, recipe: RateRecipe) -> dict[str, mpf]:
     s1 = c["h_t"] + c["h_x"] * Dx
     Dxt = root(2 * left * s1 / (2 * g) + left**2)
     Deta = (c["B_pinv_x"] * Dx + (2 * w + g) * c["B_pinv"]) * Dxt
-    Dgs = root(A / a) * (c["f_x"] + (left + c["u_star"] + kmax) * c["b_x"] + c["h_x"] * DB) + root(A) * c[
-        "feedback_gain"
-    ] * DB
+    Dgs = (
+        root(A / a) * (c["f_x"] + (left + c["u_star"] + kmax) * c["b_x"] + c["h_x"] * DB)
+        + root(A) * c["feedback_gain"] * DB
+    )
     turning = A * (DB * Dgs + DB * c["M_x"] * Dx / root(A * a) + c["B_x"] * Dx)
     J = kernel(2 * n.lam, w, c["h"], s1)
     zeta1 = 2 * n.rho * DB * (A / a) * J
@@ -297,7 +298,7 @@ def distance(n: Given, recipe: DistanceRecipe) -> dict[str, mpf]:
     if min(Y, e, S) < 0:
         return {}
     least_S, least_e = needed(n, recipe, Y)
-    if S < least_S or e < least_e:
+    if least_S > S or e < least_e:
         return {}
     return {
         "Y": Y / speed(n, recipe, S, e) - 1,
@@ -306,9 +307,13 @@ def distance(n: Given, recipe: DistanceRecipe) -> dict[str, mpf]:
 
 
 def best(problem: TubeProblem, recipe: Any) -> mpf:
-    """The margin of dbar that no Y, e and S at the gains of a recipe exceed: at the least Y of all that serve."""
+    """The least margin at the gains of a recipe; of B that which no Y, e and S exceed: at the least Y that serves."""
     with mpmath.workdps(DIGITS):
         n, Y = Given.of(problem), mpf(0)
-        for _ in range(400):
-            Y = speed(n, recipe, *needed(n, recipe, Y))
+        if isinstance(recipe, RateRecipe):
+            return left(rates(n, recipe))
+        for _ in range(200):
+            Y, before = speed(n, recipe, *needed(n, recipe, Y)), Y
+            if before == Y:
+                break
         return 1 - course(n, recipe, *needed(n, recipe, Y)).supremum() / n.dbar

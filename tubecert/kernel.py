@@ -259,8 +259,9 @@ def _ultimate(problem: TubeProblem, decisive: Checked[R], proposal: Proposal[R])
     """What is proven of the long run at the decisive gains, by their own theorem or by the companion's."""
     if theorem_of(type(decisive.recipe)).ultimate is not None:
         return decisive.ultimate_radius
+    own = THEOREMS.get(type(proposal.companion))
     same = _same(decisive.recipe, proposal.companion, "bandwidth", *_BESIDE_BANDWIDTH)
-    if type(proposal.companion) not in THEOREMS or not same:
+    if own is None or not same or not own.is_about(problem, proposal.companion):
         return None
     return check(problem, proposal.companion).ultimate_radius
 
