@@ -209,39 +209,44 @@ def kernel(c: mpf, w: mpf, s0: mpf, s1: mpf) -> mpf:
     return Course(mpf(0), mpf(1), s0, s1 / w, mpf(0), mpf(0), c, w).supremum()
 
 
-def rates(n: Given, recipe: RateRecipe) -> dict[str, mpf]:
-    """(26a), (26b), (26c) as the sheet states them, at P = I, A_m = -g I, Q = 2 g I."""
+def rate_terms(n: Given, recipe: RateRecipe) -> dict[str, mpf]:
+    """(3.1)-(3.5) as the sheet states them, at P = I, A_m = -g I, Q = 2 g I, by their names in a certificate."""
     c, root = n.c, mpmath.sqrt
-    w, Gamma, g, R = (
-        number(x)
-        for x in (
-            recipe.bandwidth,
-            recipe.adaptation_rate,
-            recipe.predictor_gain or Fraction(0),
-            recipe.projection_radius,
-        )
-    )
-    a, A, DB, left = c["lower"], c["upper"], c["B"], c["h"] + R  # left >= |sigma_hat - h|
-    kmax = root(a) * n.rho * c["feedback_gain"]
-    Dx = c["drift_on_plan"] + DB * (left + kmax)
+    w, g, R = (number(x) for x in (recipe.bandwidth, recipe.predictor_gain, recipe.projection_radius))
+    a, A, DB, du, both = c["lower"], c["upper"], c["B"], c["feedback_gain"], c["h"] + R
+    kmax = root(a) * n.rho * du
+    Dx = c["drift_on_plan"] + DB * (both + kmax)
     s1 = c["h_t"] + c["h_x"] * Dx
-    Dxt = root(2 * left * s1 / (2 * g) + left**2)
+    Dxt = root(2 * both * s1 / (2 * g) + both**2)
     Deta = (c["B_pinv_x"] * Dx + (2 * w + g) * c["B_pinv"]) * Dxt
-    Dgs = (
-        root(A / a) * (c["f_x"] + (left + c["u_star"] + kmax) * c["b_x"] + c["h_x"] * DB)
-        + root(A) * c["feedback_gain"] * DB
-    )
+    along = c["f_x"] + (both + c["u_star"] + kmax) * c["b_x"] + c["h_x"] * DB
+    Dgs = root(A / a) * along + root(A) * du * DB
     turning = A * (DB * Dgs + DB * c["M_x"] * Dx / root(A * a) + c["B_x"] * Dx)
-    J = kernel(2 * n.lam, w, c["h"], s1)
-    zeta1 = 2 * n.rho * DB * (A / a) * J
-    zeta2 = A * (2 * c["B_x"] + DB * c["M_x"] / a) * J
-    zeta3 = c["h_x"] * (4 * n.lam * A * DB + turning) / (n.lam * w)
-    zeta_p = n.rho * n.delta / (n.lam * root(a))
-    rest = a - zeta2 - zeta3
-    first = 1 - (c["initial_distance"] ** 2 / a + zeta1 + zeta_p) / n.rho_r**2
+    Psi_x, J = 2 * c["B_x"] + DB * c["M_x"] / a, kernel(2 * n.lam, w, c["h"], s1)
+    return {
+        "speed": Dx,
+        "uncertainty_rate": s1,
+        "prediction_error": Dxt,
+        "filter_error": Deta,
+        "theta": DB * A * Deta / n.lam,
+        "Psi_x": Psi_x,
+        "geodesic_rate": Dgs,
+        "Psi_rate": turning,
+        "zeta_1": 2 * n.rho * DB * (A / a) * J,
+        "zeta_2": A * Psi_x * J,
+        "zeta_3": c["h_x"] * (4 * n.lam * A * DB + turning) / (n.lam * w),
+    }
+
+
+def rates(n: Given, recipe: RateRecipe) -> dict[str, mpf]:
+    """What (26a), (26b), (26c) leave."""
+    a, found = n.c["lower"], rate_terms(n, recipe)
+    zeta_p = n.rho * n.delta / (n.lam * mpmath.sqrt(a))
+    first = 1 - (n.c["initial_distance"] ** 2 / a + found["zeta_1"] + zeta_p) / n.rho_r**2
+    rest = a - found["zeta_2"] - found["zeta_3"]
     if not rest > 0:
         return {"26a": first, "26b": rest / a, "26c": _NEVER}
-    third = 1 - DB * A * Deta / n.lam / (n.rho_a * rest) / root(Gamma)
+    third = 1 - found["theta"] / (n.rho_a * rest) / mpmath.sqrt(number(recipe.adaptation_rate))
     return {"26a": first, "26b": rest / a, "26c": third}
 
 

@@ -1,0 +1,192 @@
+"""What recheck makes of numbers of 0, A and B against the oracle in 60 digits: of those that lie, and of any."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import gains_oracle as oracle
+import mpmath
+import numpy as np
+import pytest
+from flint import arb, ctx
+from gains_oracle import Given
+from lies import KINDS, PROBLEMS, honest, told, told_twice
+from problems import ALIVE, alive, scalar_predictor
+from rechecked import case_of, certified
+from systems import SMALL
+
+from tubecert.conditions.problem import TubeProblem
+from tubecert.recheck.balls import exact
+from tubecert.recheck.conditions import (
+    DistanceProof,
+    Numbers,
+    Setting,
+    WindNumbers,
+    derived,
+    distance_bound,
+    margin,
+    margins_26,
+    own_distance_proof,
+)
+from tubecert.recheck.kinds import alone
+from tubecert.recheck.predictor import Gains
+
+F = Fraction
+BITS, CLOSE = 160, 1e-25
+
+
+@cache
+def system() -> Any:
+    """Some system: its options are replaced."""
+    return case_of(certified(SMALL, conditions="distance")).system
+
+
+def ball(x: object) -> arb:
+    return exact(F(x.above))
+
+
+def reading(p: TubeProblem) -> Setting:
+    """A problem as recheck reads it: every constant on its safe side."""
+    values = {item.name: ball(getattr(p.constants, item.name)) for item in fields(Numbers)}
+    values["lower"] = exact(F(p.constants.lower.below))
+    rest = arb(0)
+    if p.residual is not None:
+        rest = ball(p.residual.size)
+        values["plan_defect_metric"] += ball(p.residual.push)
+        values["drift_on_plan"] += rest
+    wind = None
+    if p.wind is not None:
+        own, bound = p.wind.constants, p.wind.bound
+        sizes = ball(own.push), ball(own.size), ball(own.explained)
+        wind = WindNumbers(*sizes, None if bound is None else exact(bound))
+    options = {"rate": p.rate, "horizon": p.horizon, "smooth": p.smooth, "A_m": p.A_m}
+    turns = p.constants.B_x.above > 0
+    return Setting(replace(system(), **options), Numbers(**values), p.rho, p.rho_a, wind, turns, rest)
+
+
+def gains_of(recipe: Any) -> Gains:
+    return Gains(**{item.name: getattr(recipe, item.name) for item in fields(Gains)})
+
+
+def proof_of(recipe: Any) -> DistanceProof:
+    return DistanceProof(**{item.name: exact(getattr(recipe, item.name)) for item in fields(DistanceProof)})
+
+
+def margins(setting: Setting, recipe: Any) -> dict[str, arb]:
+    """By condition, not numbers where it says that the theorem does not hold."""
+    if KINDS["0"] is type(recipe):
+        return {"no_adaptation": margin(setting, alone.supremum(setting, setting.n.h))}
+    if KINDS["A"] is type(recipe):
+        return margins_26(setting, gains_of(recipe))
+    found = distance_bound(setting, gains_of(recipe), proof_of(recipe))
+    return {"distance": arb("nan") if found is None else margin(setting, found.supremum())}
+
+
+def digits(x: arb) -> mpmath.mpf:
+    return mpmath.mpf(x.mid().str(60, radius=False))
+
+
+def same(found: arb, true: mpmath.mpf, words: object) -> None:
+    """A ball around a number, in its first 25 digits."""
+    assert found.is_finite(), words
+    assert abs(digits(found) - true) <= CLOSE * max(1, abs(true)), words
+
+
+def agrees(setting: Setting, problem: TubeProblem, recipe: Any, words: object) -> bool:
+    """Whether recheck takes a recipe for a proof, which has to be what the oracle says."""
+    found, true = margins(setting, recipe), oracle.margins(problem, recipe)
+    holds = all(value > 0 for value in found.values())
+    assert holds == (oracle.left(true) > 0), words
+    with mpmath.workdps(oracle.DIGITS):
+        for claim, value in found.items() if holds else ():
+            same(value, true[claim], (words, claim))
+    return holds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_numbers_that_lie_are_confirmed_where_they_prove_the_theorem_all_the_same(name, kind):
+    (problem, proven), recipe = PROBLEMS[name], honest(name, kind)
+    with ctx.workprec(BITS):
+        setting = reading(problem)
+        assert agrees(setting, problem, recipe, "the truth") == (kind in proven)
+        lies = (*told(recipe, kind), *told_twice(recipe, kind))
+        found = [agrees(setting, problem, lie, words) for words, lie in lies]
+    if kind != "0":
+        assert any(found) == (kind in proven)
+        assert not all(found)
+
+
+def problems(count: int) -> list[TubeProblem]:
+    """Constants of any size, beside each other; rates that are equal to what they are compared with."""
+    rng, made = np.random.default_rng(5), []
+    for k in range(count):
+        values = {name: float(x * np.exp(rng.uniform(-2, 1))) for name, x in ALIVE.items()}
+        values["B_x"] *= k % 3 > 0
+        made.append(
+            alive(
+                values=values,
+                A_m=scalar_predictor(str(F(int(rng.integers(1, 90)), 10)), 2),
+                horizon=None if k % 2 else F(int(rng.integers(1, 40)), 10),
+            )
+        )
+    return made
+
+
+OMEGAS = ("rate", "twice the rate", F(40))
+
+
+def at(problem: TubeProblem, kind: str, omega: str | Fraction) -> Any:
+    """Gains of some size, at a bandwidth that may be equal to what it is compared with."""
+    named = {"rate": problem.rate, "twice the rate": 2 * problem.rate}
+    return replace(
+        honest("every term alive", kind),
+        bandwidth=named.get(omega, omega),
+        adaptation_rate=F(10) ** 6,
+        predictor_gain=problem.predictor_gain,
+        projection_radius=problem.projection_radius,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("omega", OMEGAS)
+def test_any_numbers_of_theorem_a_are_those_of_the_theory(omega):
+    for problem in problems(40):
+        recipe = at(problem, "A", omega)
+        with ctx.workprec(BITS), mpmath.workdps(oracle.DIGITS):
+            given, setting, gains = Given.of(problem), reading(problem), gains_of(recipe)
+            true, found = oracle.rate_terms(given, recipe), derived(setting, gains)
+            assert found.keys() == true.keys()
+            for name, value in found.items():
+                same(value, true[name], name)
+            for claim, left in oracle.rates(given, recipe).items():
+                value = margins_26(setting, gains)[claim]
+                if mpmath.isfinite(left):
+                    same(value, left, claim)
+                else:
+                    assert not value > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("omega", OMEGAS)
+def test_any_numbers_of_theorems_0_and_b_are_those_of_the_theory(omega):
+    """At the Y, e and S that recheck finds by itself."""
+    for problem in problems(40):
+        recipe = at(problem, "B", omega)
+        with ctx.workprec(BITS), mpmath.workdps(oracle.DIGITS):
+            given, setting, gains = Given.of(problem), reading(problem), gains_of(recipe)
+            own, h = oracle.alone(given), setting.n.h
+            same(alone.supremum(setting, h), own.supremum(), "sup D of 0")
+            same(alone.settled(setting, h), own.ultimate, "A1 of 0")
+            proof = own_distance_proof(setting, gains)
+            found = distance_bound(setting, gains, proof)
+            assert found is not None
+            true = oracle.course(given, recipe, digits(proof.uncertainty), digits(proof.prediction_error))
+            same(found.supremum(), true.supremum(), "sup D")
+            same(found.ultimate(), true.ultimate, "A1")
+            least = oracle.best(problem, recipe)
+            assert abs(1 - true.supremum() / given.dbar - least) <= 1e-20 * (1 + abs(least))
