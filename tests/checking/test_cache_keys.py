@@ -5,9 +5,12 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from systems import SMALL
 
 from tubecert.checking import cache
-from tubecert.spec import canonical, load, load_question
+from tubecert.spec import Setting, canonical, load, load_question
+from tubecert.spec.load import load_source
+from tubecert.spec.source import Source
 
 ROOT = Path(__file__).parents[2]
 SPECIFICATIONS = [
@@ -82,3 +85,13 @@ def test_the_text_counts_by_what_it_says(old, new, same, tmp_path):
     target = tmp_path / "changed.yaml"
     target.write_text(text.replace(old, new), encoding="utf-8")
     assert (key(load(str(target))) == key(load(str(ROOT / "configs" / "two_state_orbit.yaml")))) is same
+
+
+def test_what_was_set_in_place_of_the_file_counts():
+    """The text is the same, and what is found is not."""
+    source = Source.of("small.yaml", SMALL)
+    set_to = [(), ("tube.epsilon=0.5",), ("tube.epsilon=0.4",), ("tube.rho_a=0.4",)]
+    specs = [load_source(source, list(map(Setting.of, words))) for words in set_to]
+    assert len({spec.source for spec in specs}) == 1
+    assert len({cache.key_of_text("lint", spec) for spec in specs}) == len(specs)
+    assert len({key(spec) for spec in specs}) == len(specs)

@@ -6,9 +6,11 @@ from fractions import Fraction
 import pytest
 import yaml
 from rechecked import CONFIGS, certified, examine, failing, respecified, unconfirmed
+from systems import SMALL
 
 from tubecert.errors import TubecertError
-from tubecert.recheck.obstacles import is_simple
+from tubecert.recheck.clearances import _square, _turned
+from tubecert.recheck.obstacles import Shape, is_simple
 
 ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text("utf-8")
 CLEAR = [
@@ -130,3 +132,37 @@ def test_a_polygon_around_the_plan_listed_twice_is_refused(clear):
         lambda s: s["obstacles"][1].update(polygon=[["-6", "-6"], ["6", "-6"], ["6", "6"], ["-6", "6"]] * 2),
     )
     assert unconfirmed(forged)
+
+
+# -- where W12 is not the same everywhere in the tube, what counts is the end that makes the tube wide
+
+BENT = (
+    SMALL.replace('[[1, "-0.3"], ["-0.3", 2]]', '[[1, "0.2*x"], ["0.2*x", 2]]').replace(
+        "rate: 0.8", "rate: 0.5"
+    )
+    + "obstacles: [{states: [x, y], disc: {center: [0.4, 0.4], radius: 0.1}},"
+    + " {states: [x, y], disc: {center: [0.4, -0.4], radius: 0.1}}]\n"
+)
+
+
+@pytest.mark.slow
+def test_a_tube_is_as_wide_as_its_metric_allows_anywhere_in_it():
+    honest = certified(BENT, conditions="none")
+    low, high = honest["result"]["clearance"][0]["shape"]["beside"]
+    assert low < -0.07 < 0.07 < high
+    assert not failing(examine(honest))
+    for k in (0, 1):
+        forged = copy.deepcopy(honest)
+        own = forged["result"]["clearance"][k]["clearance"]
+        own[:] = [end * 1.0001 for end in own]
+        assert unconfirmed(forged)
+
+
+@pytest.mark.parametrize(
+    "beside", [(-1, 1), (Fraction("0.2"), Fraction("0.7")), (Fraction("-0.7"), Fraction("-0.2"))]
+)
+def test_what_a_direction_is_at_most_is_reached_at_an_end_of_what_stands_beside(beside):
+    shape = Shape((Fraction(2), Fraction(3)), tuple(map(Fraction, beside)))
+    for c, s in _turned():
+        ends = [2 * c * c + 3 * s * s + 2 * c * s * w for w in shape.beside]
+        assert _square(shape, (c, s)) == max(ends)

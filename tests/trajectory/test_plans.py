@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from proven import proven
 from strategies import fractions
+from systems import SMALL
 
 from tubecert.certificate import seal
 from tubecert.enclosure.branch_and_bound import Effort, supremum
@@ -567,3 +569,18 @@ def test_a_rough_plan_says_by_how_much_it_is_too_rough(tmp_path):
     (reason,) = result["reasons"]
     assert reason["needed"] > reason["allowed"]
     assert reason["relax"][-1]["remedy"] == {"id": "more_knots"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("drift", "horizon", "greatest"),
+    [("0.01*t", "2", 0.02), ("0.02*sin(t/2)", "2", 0.02 * np.sin(1)), ("0.01*sin(t)**3", None, 0.01)],
+)
+def test_a_plan_that_rests_is_off_by_what_f_does_at_any_time(drift, horizon, greatest):
+    """Where x' = 0 is no solution, it is most wrong at the end of the horizon, or somewhere in a period."""
+    until = "" if horizon is None else f", horizon: {horizon}"
+    text = SMALL.replace('"-x + y"', f'"-x + y + {drift}"').replace("input: [0]}", f"input: [0]{until}}}")
+    found = proven(text, bare=True, conditions="none")["result"]["constants"]
+    stretch = np.sqrt(2 / (2 * 1 - 0.3**2))  # of M = W^-1, along x
+    for name, expected in (("plan_defect", greatest), ("plan_defect_metric", greatest * stretch)):
+        assert found[name]["below"] <= expected <= found[name]["above"] <= 1.05 * expected
