@@ -9,6 +9,7 @@ from functools import cache
 from itertools import combinations, product
 from typing import Any
 
+import numpy as np
 from problems import ALIVE, alive, scalar_predictor, two_state
 
 from tubecert.bounds.constants import ResidualConstants, WindConstants
@@ -45,6 +46,8 @@ WIDE = {name: (x, 1.01 * x) if name == "lower" else (0.99 * x, x) for name, x in
 PROBLEMS: dict[str, tuple[TubeProblem, str]] = {
     "every term alive": (alive(), "0AB"),
     "constants that are enclosed": (alive(values=WIDE), "0AB"),
+    "radii that were rounded": (alive(rho_r=F("0.7") * (1 + F(5, 10**10))), "0AB"),
+    "a start near the plan": (alive(values={"initial_distance": 0.01}, horizon=F(1, 2)), "0AB"),
     "any predictor": (alive(A_m=None), "0AB"),
     "a smooth projection": (alive(smooth=F(1, 4)), "0AB"),
     "a short horizon": (alive(horizon=F(1, 5)), "0AB"),
@@ -92,3 +95,37 @@ def told_twice(recipe: Any, kind: str) -> Iterator[tuple[str, Any]]:
     for names, factor in product(combinations(NUMBERS[kind], 2), map(F, ("0.99", "0.1", "10", "-1"))):
         changed = {name: getattr(recipe, name) * factor for name in names}
         yield f"{' and '.join(names)} times {float(factor):g}", replace(recipe, **changed)
+
+
+# -- numbers of any size
+
+OMEGAS = ("rate", "twice the rate", F(40))
+
+
+@cache
+def problems() -> list[TubeProblem]:
+    """Constants of any size, beside each other; rates that are equal to what they are compared with."""
+    rng, made = np.random.default_rng(5), []
+    for k in range(40):
+        values = {name: float(x * np.exp(rng.uniform(-2, 1))) for name, x in ALIVE.items()}
+        values["B_x"] *= k % 3 > 0
+        made.append(
+            alive(
+                values=values,
+                A_m=scalar_predictor(str(F(int(rng.integers(1, 90)), 10)), 2),
+                horizon=None if k % 2 else F(int(rng.integers(1, 40)), 10),
+            )
+        )
+    return made
+
+
+def at(problem: TubeProblem, kind: str, omega: str | Fraction) -> Any:
+    """Gains of some size, at a bandwidth that may be equal to what it is compared with."""
+    named = {"rate": problem.rate, "twice the rate": 2 * problem.rate}
+    return replace(
+        honest("every term alive", kind),
+        bandwidth=named.get(omega, omega),
+        adaptation_rate=F(10) ** 6,
+        predictor_gain=problem.predictor_gain,
+        projection_radius=problem.projection_radius,
+    )

@@ -13,7 +13,7 @@ from typing import Any
 import gains_oracle as oracle
 import pytest
 from gains_oracle import CLOSE
-from lies import KINDS, NUMBERS, PROBLEMS, exactly, honest, told, told_twice
+from lies import KINDS, NUMBERS, OMEGAS, PROBLEMS, at, exactly, honest, problems, told, told_twice
 from problems import ALIVE
 
 from tubecert.conditions.alone import NoGains
@@ -31,12 +31,15 @@ PRINTED = 1 + 1e-8  # what is printed is rounded up
 def agrees(problem: TubeProblem, recipe: Any, words: object = "") -> bool:
     """Whether a recipe is proven, which has to be what the oracle says of it, with its margins, radius and inputs."""
     true, found = oracle.margins(problem, recipe), check(problem, recipe)
+    for claim, margin in found.margins.items() if true else ():
+        assert margin.lo <= true[claim], (words, claim)
     if not isinstance(found, Proof):
         assert oracle.left(true) <= CLOSE, words
         return False
     assert oracle.left(true) > 0, words
-    for claim, margin in found.margins.items():
-        assert true[claim] - CLOSE <= margin.lo <= true[claim] <= margin.hi, (words, claim)
+    assert all(true[x] - CLOSE <= margin.lo <= true[x] <= margin.hi for x, margin in found.margins.items()), (
+        words
+    )
     own, shares = oracle.claims(problem, recipe), found.input_shares
     assert (shares is None) == (own.feedback == inf), words
     if shares is not None:
@@ -95,6 +98,20 @@ def test_a_recipe_for_a_milder_problem_is_certified_where_it_proves_the_theorem_
         agrees(replace(problem, **{part: getattr(problem, part) * factor}), recipe, part)
     for T in map(F, ("0.01", "0.1", "1", "10")):
         agrees(replace(problem, horizon=T), recipe, T)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("omega", OMEGAS)
+def test_margins_of_any_size_are_those_of_the_theory(omega):
+    for problem in problems():
+        gains = at(problem, "A", omega)
+        own = recipe_at(problem, gains.bandwidth, gains.adaptation_rate, gains.predictor_gain)
+        for recipe in (NoGains(), gains, own):
+            true = oracle.margins(problem, recipe)
+            for claim, margin in check(problem, recipe).margins.items():
+                tolerance = 1e-9 * (1 + abs(true[claim]))
+                assert margin.lo <= true[claim]
+                assert margin.lo >= true[claim] - tolerance or true[claim] == -inf
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -181,8 +198,8 @@ def test_of_what_stands_beside_only_what_is_proven_is_kept(kind):
         )
         assert set(judgement.curve) <= {recipe}
         for claim, lows in judgement.around.items():
-            for at, low in zip(judgement.around_at, lows, strict=True):
-                assert low <= oracle.margins(problem, at).get(claim, -inf)
+            for other, low in zip(judgement.around_at, lows, strict=True):
+                assert low <= oracle.margins(problem, other).get(claim, -inf)
         # and the lie decides: what is true beside it does not help
         judgement = judge(
             problem, theorem, Proposal(decisive=lie, beside={"least_adaptation": recipe}, curve=(recipe,))

@@ -9,12 +9,10 @@ from typing import Any
 
 import gains_oracle as oracle
 import mpmath
-import numpy as np
 import pytest
 from flint import arb, ctx
 from gains_oracle import Given
-from lies import KINDS, PROBLEMS, honest, told, told_twice
-from problems import ALIVE, alive, scalar_predictor
+from lies import KINDS, OMEGAS, PROBLEMS, at, honest, problems, told, told_twice
 from rechecked import case_of, certified
 from systems import SMALL
 
@@ -121,41 +119,10 @@ def test_numbers_that_lie_are_confirmed_where_they_prove_the_theorem_all_the_sam
         assert not all(found)
 
 
-def problems(count: int) -> list[TubeProblem]:
-    """Constants of any size, beside each other; rates that are equal to what they are compared with."""
-    rng, made = np.random.default_rng(5), []
-    for k in range(count):
-        values = {name: float(x * np.exp(rng.uniform(-2, 1))) for name, x in ALIVE.items()}
-        values["B_x"] *= k % 3 > 0
-        made.append(
-            alive(
-                values=values,
-                A_m=scalar_predictor(str(F(int(rng.integers(1, 90)), 10)), 2),
-                horizon=None if k % 2 else F(int(rng.integers(1, 40)), 10),
-            )
-        )
-    return made
-
-
-OMEGAS = ("rate", "twice the rate", F(40))
-
-
-def at(problem: TubeProblem, kind: str, omega: str | Fraction) -> Any:
-    """Gains of some size, at a bandwidth that may be equal to what it is compared with."""
-    named = {"rate": problem.rate, "twice the rate": 2 * problem.rate}
-    return replace(
-        honest("every term alive", kind),
-        bandwidth=named.get(omega, omega),
-        adaptation_rate=F(10) ** 6,
-        predictor_gain=problem.predictor_gain,
-        projection_radius=problem.projection_radius,
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("omega", OMEGAS)
 def test_any_numbers_of_theorem_a_are_those_of_the_theory(omega):
-    for problem in problems(40):
+    for problem in problems():
         recipe = at(problem, "A", omega)
         with ctx.workprec(BITS), mpmath.workdps(oracle.DIGITS):
             given, setting, gains = Given.of(problem), reading(problem), gains_of(recipe)
@@ -175,7 +142,7 @@ def test_any_numbers_of_theorem_a_are_those_of_the_theory(omega):
 @pytest.mark.parametrize("omega", OMEGAS)
 def test_any_numbers_of_theorems_0_and_b_are_those_of_the_theory(omega):
     """At the Y, e and S that recheck finds by itself."""
-    for problem in problems(40):
+    for problem in problems():
         recipe = at(problem, "B", omega)
         with ctx.workprec(BITS), mpmath.workdps(oracle.DIGITS):
             given, setting, gains = Given.of(problem), reading(problem), gains_of(recipe)
