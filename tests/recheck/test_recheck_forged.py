@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -129,22 +129,15 @@ OF_A: dict[str, tuple[Change, str]] = {
         for claim in ("26a", "26b", "26c")
     },
     "rate around": (
-        lambda r: times(r[A]["margins_around"], "adaptation_rate", 2),
+        lambda r: times(r[A]["margins_around"], "adaptation_rate", 0.5),
         "A: margins around",
     ),
     "predictor around": (lambda r: times(r[A]["margins_around"], "predictor_gain", 0.5), "A: margins around"),
 }
-DERIVED = [
-    "speed",
-    "uncertainty_rate",
-    "prediction_error",
-    "filter_error",
-    "theta",
-    "geodesic_rate",
-    "Psi_rate",
-    "zeta_1",
-    "zeta_3",
-]
+DERIVED = (
+    *("speed", "uncertainty_rate", "prediction_error", "filter_error", "theta", "geodesic_rate", "Psi_rate"),
+    *("zeta_1", "zeta_3"),
+)
 OF_B: dict[str, tuple[Change, str]] = {
     "margin": (lambda r: more(r[B]["least_adaptation"]["margin"]), "B: sup D < dbar"),
     "margin of the split": (lambda r: more(r[B]["split"]["margin"]), "B: sup D < dbar"),
@@ -199,20 +192,17 @@ OF_START: dict[str, tuple[Change, str]] = {
 }
 
 
-def groups() -> Iterator[Any]:
-    for group, changes in (("0", OF_0), ("A", OF_A), ("B", OF_B), ("start", OF_START)):
-        for name, (change, claim) in changes.items():
-            yield pytest.param(change, claim, id=f"{group}: {name}")
+GROUPS = {"0": OF_0, "A": OF_A, "B": OF_B, "start": OF_START}
 
 
-@pytest.mark.parametrize(("change", "claim"), groups())
-def test_what_is_stated_better_than_it_is_fails_in_the_claim_about_it(honest, change, claim):
+@pytest.mark.parametrize(("group", "name"), [(group, name) for group, own in GROUPS.items() for name in own])
+def test_what_is_stated_better_than_it_is_fails_in_the_claim_about_it(honest, group, name):
+    change, claim = GROUPS[group][name]
     found = failed(honest, change)
     assert any(name.startswith(claim) for name in found), found
 
 
 WEAKER: dict[str, Change] = {
-    "margins": lambda r: [more(x, by=-1e-4) for x in (r[ALONE]["margin"], r[A]["margins"]["26b"])],
     "distance": lambda r: times(r[ALONE]["distance"], 1, 1.1),
     "radii": lambda r: [times(r[key], "ultimate_radius", 1.1) for key in (ALONE, A, B)],
     "largest h": lambda r: times(r[ALONE], "uncertainty_limit", 0.9),
