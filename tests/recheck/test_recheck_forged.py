@@ -25,12 +25,17 @@ Result = dict[str, Any]
 Change = Callable[[Result], object]
 
 
-@pytest.fixture(scope="module")
-def honest():
-    document, memory = certified(TEXT, bare=False), {}
+def examined(text: str, **options: Any) -> Any:
+    """A certificate that is confirmed, and what was examined of it."""
+    document, memory = certified(text, **options), {}
     assert document["result"]["verdict"] == "certified"
     assert failing(examine(document, memory=memory)) == []
     return document, memory
+
+
+@pytest.fixture(scope="module")
+def honest():
+    return examined(TEXT, bare=False)
 
 
 def failed(honest: Any, change: Change) -> list[str]:
@@ -216,3 +221,37 @@ WEAKER: dict[str, Change] = {
 def test_what_is_stated_worse_than_it_is_stays_confirmed(honest, name):
     """What shows that the others fail for what they are, and not for being touched."""
     assert failed(honest, WEAKER[name]) == []
+
+
+# -- where the start counts alone, and where what is told is not certified
+
+
+def test_a_distance_below_the_start_is_refused_where_d_falls_from_there():
+    far = examined(
+        SMALL.replace("0.1*sin(t) + 0.05*x", "0.01*sin(t)").replace("at: [0.05, 0]", "at: [0.15, 0.1]"),
+        conditions="distance",
+    )
+    assert far[0]["result"][ALONE]["ultimate_radius"] < 0.02
+
+    def change(r: Result) -> None:
+        r[ALONE]["distance"] = [0.1, 0.99 * r["constants"]["initial_distance"]["above"]]
+
+    assert any(name.startswith("0: sup D <= ") for name in failed(far, change))
+
+
+@pytest.fixture(scope="module")
+def strong():
+    return examined(SMALL.replace("0.1*sin(t)", "0.4*sin(t)"), conditions="distance")
+
+
+TOLD: dict[str, Change] = {
+    "a better margin": lambda r: more(r[ALONE]["margin"], by=1e-3),
+    "a radius": lambda r: r[ALONE].update(ultimate_radius=1.0),
+}
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_what_is_told_of_a_feedback_that_does_not_suffice_is_true(strong, name):
+    assert strong[0]["result"][ALONE]["verdict"] == "refuted"
+    assert "0: what is told of it" in failed(strong, TOLD[name])
+    assert failed(strong, lambda r: more(r[ALONE]["margin"], by=-1e-3)) == []

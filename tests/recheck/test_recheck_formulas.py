@@ -9,6 +9,7 @@ from typing import Any
 
 import gains_oracle as oracle
 import mpmath
+import numpy as np
 import pytest
 from flint import arb, ctx
 from gains_oracle import Given
@@ -29,6 +30,7 @@ from tubecert.recheck.conditions import (
     margins_26,
     own_distance_proof,
 )
+from tubecert.recheck.filtering import Distance, kappa, tight_kernel
 from tubecert.recheck.kinds import alone
 from tubecert.recheck.predictor import Gains
 
@@ -157,3 +159,74 @@ def test_any_numbers_of_theorems_0_and_b_are_those_of_the_theory(omega):
             same(found.ultimate(), true.ultimate, "A1")
             least = oracle.best(problem, recipe)
             assert abs(1 - true.supremum() / given.dbar - least) <= 1e-20 * (1 + abs(least))
+
+
+# -- balls that are wide: what cannot be decided is bounded in every case
+
+
+@pytest.fixture
+def precise():
+    with ctx.workprec(BITS), mpmath.workdps(oracle.DIGITS):
+        yield
+
+
+def inside(x: arb, rng: np.random.Generator) -> mpmath.mpf:
+    """A number of a ball: one of its ends, or between them."""
+    at = rng.choice([-1.0, 0.0, 1.0, rng.uniform(-1, 1)])
+    return mpmath.mpf(float(x.mid())) + mpmath.mpf(at * (1 - 1e-9)) * mpmath.mpf(float(x.rad()))
+
+
+SHARES = (0.0, 1e-12, 1e-3, 0.2)  # of a number, by which its ball is wide
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("precise")
+@pytest.mark.parametrize("share", SHARES)
+def test_a_supremum_bounds_that_of_every_number_of_its_balls(share):
+    """Rates that are equal, a filter that starts where it ends; with and without an end."""
+    rng, moving = np.random.default_rng(11), 0
+    for k in range(300):
+        d0, beta, H0, S, e, delta, lam = map(float, np.exp(rng.uniform(-2.5, 1.5, 7)))
+        own = {
+            "d0": d0 * (k % 3 > 0),
+            "beta": beta,
+            "H0": H0,
+            "S": (S, H0, S / 50)[k % 3],
+            "e": e,
+            "delta": delta,
+        }
+        w = lam * (1.0, 1 + 1e-13, 0.2, 3.0, 40.0)[k % 5]
+        T = None if k % 2 else float(np.exp(rng.uniform(-3, 2))) / lam
+        balls = {name: arb(x, share * x) for name, x in own.items()}
+        end = None if T is None else arb(T)
+        found = Distance(**balls, rate=arb(lam), omega=arb(w), horizon=end).supremum()
+        for _ in range(3):
+            numbers = [inside(x, rng) for x in balls.values()]
+            last = None if T is None else mpmath.mpf(T)
+            true = oracle.Course(*numbers, mpmath.mpf(lam), mpmath.mpf(w), last)
+            top = true.supremum()
+            assert digits(found.upper()) >= top
+            assert share > 0 or digits(found.upper()) <= top + CLOSE * top
+            moving += top > 1.001 * max(true.d0, true.ultimate if T is None else true.at(last))
+    assert moving > 50
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("precise")
+@pytest.mark.parametrize("share", SHARES)
+def test_a_kernel_bounds_that_of_every_number_of_its_balls(share):
+    """On both sides of where its cases meet, and there."""
+    rng = np.random.default_rng(12)
+    for k in range(300):
+        c, s0 = map(float, np.exp(rng.uniform(-2, 2, 2)))
+        w = c * (1.0, 1 + 1e-13, 0.3, 7.0, float(np.exp(rng.uniform(-3, 3))))[k % 5]
+        s1 = min(c, w) * s0 * (0.2, 1.0, 1 - 1e-10, 3.0)[k % 4]
+        balls = arb(s0, share * s0), arb(s1, share * s1)
+        found = tight_kernel(arb(c), arb(w), *balls)
+        for _ in range(3):
+            true = oracle.kernel(mpmath.mpf(c), mpmath.mpf(w), *(inside(x, rng) for x in balls))
+            assert digits(found.upper()) >= true
+            assert share > 0 or digits(found.upper()) <= true + CLOSE * true
+        # sup |e^(-wt) - e^(-ct)|/|c - w| is that of a course as well
+        peak = oracle.Course(*map(mpmath.mpf, (0, 1, 1, 0, 0, 0)), mpmath.mpf(c), mpmath.mpf(w)).supremum()
+        same(kappa(arb(c), arb(w)), peak, "kappa")
