@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import pytest
@@ -255,3 +256,35 @@ def test_what_is_told_of_a_feedback_that_does_not_suffice_is_true(strong, name):
     assert strong[0]["result"][ALONE]["verdict"] == "refuted"
     assert "0: what is told of it" in failed(strong, TOLD[name])
     assert failed(strong, lambda r: more(r[ALONE]["margin"], by=-1e-3)) == []
+
+
+# -- what was asked for
+
+
+@pytest.mark.parametrize(("key", "option"), [(A, "26"), (B, "distance")])
+@pytest.mark.parametrize("gain", ["bandwidth", "adaptation_rate"])
+def test_gains_that_were_asked_for_are_those_that_are_judged(key, option, gain):
+    asked = {"bandwidth": Fraction(300), "adaptation_rate": Fraction(10**9)}
+    made = examined(SMALL, conditions=option, **asked)
+
+    def change(r: Result) -> None:
+        r["overrides"][gain] *= 2
+        if key != A:  # the first that differs is named
+            r[A][gain] *= 2
+
+    document = copy.deepcopy(made[0])
+    change(document["result"])
+    reasons = [why for _, why in failing(examine(sealed(document), memory=dict(made[1])))]
+    assert any(f"overrides.{gain} is not what {key} judges" in why for why in reasons), reasons
+
+
+def test_a_predictor_that_was_asked_for_is_the_one_that_is_printed():
+    """A matrix that is no -g I names no gain, by which it could be told from the one of the specification."""
+    made = examined(SMALL, conditions="26")
+
+    def change(r: Result) -> None:
+        r[A]["A_m"] = [[-10.0, 0.1], [0.0, -10.0]]
+        r[A]["Q"] = [[20.0, -0.1], [-0.1, 20.0]]
+        r["proof"][A]["predictor_gain"] = None
+
+    assert failed(made, change)

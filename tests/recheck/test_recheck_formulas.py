@@ -172,11 +172,11 @@ def precise():
 
 def inside(x: arb, rng: np.random.Generator) -> mpmath.mpf:
     """A number of a ball: one of its ends, or between them."""
-    at = rng.choice([-1.0, 0.0, 1.0, rng.uniform(-1, 1)])
+    at = rng.choice([-1.0, 1.0, rng.uniform(-1, 1)])
     return mpmath.mpf(float(x.mid())) + mpmath.mpf(at * (1 - 1e-9)) * mpmath.mpf(float(x.rad()))
 
 
-SHARES = (0.0, 1e-12, 1e-3, 0.2)  # of a number, by which its ball is wide
+SHARES = (0.0, 1e-12, 1e-3, 0.2, 0.9)  # of a number, by which its ball is wide
 
 
 @pytest.mark.slow
@@ -197,10 +197,10 @@ def test_a_supremum_bounds_that_of_every_number_of_its_balls(share):
         }
         w = lam * (1.0, 1 + 1e-13, 0.2, 3.0, 40.0)[k % 5]
         T = None if k % 2 else float(np.exp(rng.uniform(-3, 2))) / lam
-        balls = {name: arb(x, share * x) for name, x in own.items()}
+        balls = {name: arb(x, share * x * (rng.random() < 0.5)) for name, x in own.items()}
         end = None if T is None else arb(T)
         found = Distance(**balls, rate=arb(lam), omega=arb(w), horizon=end).supremum()
-        for _ in range(3):
+        for _ in range(8):
             numbers = [inside(x, rng) for x in balls.values()]
             last = None if T is None else mpmath.mpf(T)
             true = oracle.Course(*numbers, mpmath.mpf(lam), mpmath.mpf(w), last)
