@@ -261,7 +261,7 @@ def _ultimate(problem: TubeProblem, decisive: Checked[R], proposal: Proposal[R])
         return decisive.ultimate_radius
     own = THEOREMS.get(type(proposal.companion))
     same = _same(decisive.recipe, proposal.companion, "bandwidth", *_BESIDE_BANDWIDTH)
-    if own is None or not same or not own.is_about(problem, proposal.companion):
+    if own is None or not same or not own.states(problem, proposal.companion):
         return None
     return check(problem, proposal.companion).ultimate_radius
 

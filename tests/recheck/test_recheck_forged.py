@@ -60,11 +60,17 @@ def more(place: list[float | None], k: int = 0, by: float = 1e-6) -> None:
     place[k] = value + by
 
 
+def ends_early(margin: list[float]) -> None:
+    """No interval: its upper end below what is proven."""
+    margin[1] = margin[0] / 2
+
+
 A, B, ALONE = "conditions_26", "distance", "no_adaptation"
 OF_0: dict[str, tuple[Change, str]] = {
     "margin": (lambda r: more(r[ALONE]["margin"]), "0: sup D < dbar"),
     "margin that is none": (lambda r: r[ALONE].update(margin=[-0.1, 0.9]), "0: sup D < dbar"),
     "margin without an end": (lambda r: r[ALONE].update(margin=[None, 0.9]), "0: sup D < dbar"),
+    "margin that ends before it begins": (lambda r: ends_early(r[ALONE]["margin"]), "0: sup D < dbar"),
     "distance": (lambda r: times(r[ALONE]["distance"], 1, 1 - 1e-3), "0: sup D <= "),
     "distance below the start": (lambda r: r[ALONE].update(distance=[0.01, 0.05]), "0: sup D <= "),
     "ultimate radius": (lambda r: times(r[ALONE], "ultimate_radius", 1 - 1e-6), "0: sup D < dbar"),
@@ -108,6 +114,7 @@ OF_A: dict[str, tuple[Change, str]] = {
         )
         for claim in ("26a", "26b", "26c")
     },
+    "margin that ends before it begins": (lambda r: ends_early(r[A]["margins"]["26b"]), "A: (26a)-(26c)"),
     "bandwidth": (lambda r: pair(r, A, bandwidth=0.99), "A: (26a)-(26c)"),
     "rate": (lambda r: pair(r, A, adaptation_rate=0.999), "A: (26a)-(26c)"),
     "projection": (lambda r: pair(r, A, projection_radius=0.999), "A: (26a)-(26c)"),
@@ -147,6 +154,7 @@ DERIVED = (
 OF_B: dict[str, tuple[Change, str]] = {
     "margin": (lambda r: more(r[B]["least_adaptation"]["margin"]), "B: sup D < dbar"),
     "margin of the split": (lambda r: more(r[B]["split"]["margin"]), "B: sup D < dbar"),
+    "margin that ends before it begins": (lambda r: ends_early(r[B]["split"]["margin"]), "B: sup D < dbar"),
     "bandwidth": (lambda r: pair(r, B, bandwidth=0.99), "B: sup D < dbar"),
     "rate": (lambda r: pair(r, B, adaptation_rate=0.999), "B: sup D < dbar"),
     "rate of the split": (lambda r: times(r[B]["split"], "adaptation_rate", 0.99), "B: sup D < dbar"),
@@ -276,6 +284,18 @@ def test_gains_that_were_asked_for_are_those_that_are_judged(key, option, gain):
     change(document["result"])
     reasons = [why for _, why in failing(examine(sealed(document), memory=dict(made[1])))]
     assert any(f"overrides.{gain} is not what {key} judges" in why for why in reasons), reasons
+
+
+def test_a_pair_of_b_is_called_asked_where_it_was():
+    """Where gains were asked for no others decide, and where none were none are told as if they had been."""
+    asked = {"bandwidth": Fraction(300), "adaptation_rate": Fraction(10**9)}
+    for options, gone, there in (({}, "least_adaptation", "asked"), (asked, "asked", "least_adaptation")):
+        made = examined(SMALL, conditions="distance", **options)
+
+        def change(r: Result, gone: str = gone, there: str = there) -> None:
+            r[B][there], r[B][gone] = r[B][gone], None
+
+        assert "the specification and what repeats it" in failed(made, change)
 
 
 def test_a_predictor_that_was_asked_for_is_the_one_that_is_printed():

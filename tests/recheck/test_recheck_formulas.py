@@ -32,6 +32,7 @@ from tubecert.recheck.conditions import (
 )
 from tubecert.recheck.filtering import Distance, kappa, tight_kernel
 from tubecert.recheck.kinds import alone
+from tubecert.recheck.kinds.bounds import ultimate
 from tubecert.recheck.predictor import Gains
 
 F = Fraction
@@ -143,7 +144,8 @@ def test_any_numbers_of_theorem_a_are_those_of_the_theory(omega):
 @pytest.mark.slow
 @pytest.mark.parametrize("omega", OMEGAS)
 def test_any_numbers_of_theorems_0_and_b_are_those_of_the_theory(omega):
-    """At the Y, e and S that recheck finds by itself."""
+    """At the Y, e and S that recheck finds by itself; a radius in the long run follows where the tube does."""
+    followed = set()
     for problem in problems():
         recipe = at(problem, "B", omega)
         with ctx.workprec(BITS), mpmath.workdps(oracle.DIGITS):
@@ -157,8 +159,12 @@ def test_any_numbers_of_theorems_0_and_b_are_those_of_the_theory(omega):
             true = oracle.course(given, recipe, digits(proof.uncertainty), digits(proof.prediction_error))
             same(found.supremum(), true.supremum(), "sup D")
             same(found.ultimate(), true.ultimate, "A1")
+            holds = true.supremum() < given.dbar
+            assert ultimate(F(10) ** 9, setting, gains, proof).holds == holds
+            followed.add(holds)
             least = oracle.best(problem, recipe)
             assert abs(1 - true.supremum() / given.dbar - least) <= 1e-20 * (1 + abs(least))
+    assert len(followed) == 2
 
 
 # -- balls that are wide: what cannot be decided is bounded in every case

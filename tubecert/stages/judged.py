@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +17,7 @@ from tubecert.kinds.kind import Section
 from tubecert.kinds.table import KINDS, kind_of
 from tubecert.letters import ALL
 from tubecert.stages.bounded import Bounded
+from tubecert.stages.options import Options
 from tubecert.stages.question import Question
 from tubecert.verdict import Verdict
 
@@ -77,8 +78,22 @@ def deciding(question: Question) -> tuple[str, ...]:
 
 def judge_all(bounded: Bounded, proposals: Mapping[type, Proposal[Any]]) -> Judged:
     """The sections about what is proposed, by the recipe of each kind."""
+    options = bounded.question.options
     sections = {
-        kind.key: kind.section(bounded.problem, proposals.get(kind.theorem.recipe, Proposal()))
+        kind.key: kind.section(
+            bounded.problem, _answering(options, proposals.get(kind.theorem.recipe, Proposal()))
+        )
         for kind in KINDS
     }
     return Judged(bounded=bounded, sections=sections)
+
+
+def _answering(options: Options, proposal: Proposal[Any]) -> Proposal[Any]:
+    """A proposal without what would decide, where it is about other gains than were asked for."""
+    wanted = {"bandwidth": options.bandwidth, "adaptation_rate": options.adaptation_rate}
+
+    def kept(recipe: Any) -> Any:
+        same = all(value in (None, getattr(recipe, name, value)) for name, value in wanted.items())
+        return recipe if same else None
+
+    return replace(proposal, decisive=kept(proposal.decisive), hopeless=kept(proposal.hopeless))
