@@ -93,20 +93,18 @@ class Given:
     g: Fraction | None
     wind: tuple[mpf, mpf, mpf]  # beta_w |w|, D_E |w|, eps_w |w|
     rest: tuple[mpf, mpf]  # beta_r, D_r
-    sought: bool
     covered: bool  # by theorem A
 
     @classmethod
     def of(cls, p: TubeProblem) -> Given:
         c = {name: mpf(getattr(p.constants, name).above) for name in set().union(*NEEDED.values())}
         c["lower"] = mpf(p.constants.lower.below)
-        none, rest, sought, blows = mpf(0), (mpf(0), mpf(0)), False, False
+        none, rest, blows = mpf(0), (mpf(0), mpf(0)), False
         wind = (none, none, none)
         if p.wind is not None:
-            own, sought = p.wind.constants, p.wind.bound is None
-            size = none if p.wind.bound is None else number(p.wind.bound)
+            own, size = p.wind.constants, number(p.wind.bound)
             wind = tuple(mpf(x.above) * size for x in (own.push, own.size, own.explained))  # type: ignore[assignment]
-            blows = own.size.above > 0 and (sought or size > 0)
+            blows = own.size.above > 0 and size > 0
         if p.residual is not None:
             rest = mpf(p.residual.push.above), mpf(p.residual.size.above)
         rho, rho_a = number(p.rho), number(p.rho_a)
@@ -121,7 +119,6 @@ class Given:
             g=p.predictor_gain,
             wind=wind,
             rest=rest,
-            sought=sought,
             covered=not blows and rest[1] <= 0,
         )
 
@@ -148,11 +145,11 @@ def margins(problem: TubeProblem, recipe: object) -> dict[str, mpf]:
         given = Given.of(problem)
         if not all(mpmath.isfinite(given.c[name]) for name in NEEDED[type(recipe)]):
             return {}
-        if isinstance(recipe, NoGains) and not given.sought:
+        if isinstance(recipe, NoGains):
             return {"no_adaptation": 1 - alone(given).supremum() / given.dbar}
         if isinstance(recipe, RateRecipe) and given.covered and given.loop(recipe):
             return rates(given, recipe)
-        if isinstance(recipe, DistanceRecipe) and not given.sought and given.loop(recipe):
+        if isinstance(recipe, DistanceRecipe) and given.loop(recipe):
             return distance(given, recipe)
         return {}
 

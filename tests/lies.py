@@ -10,7 +10,7 @@ from itertools import combinations, product
 from typing import Any
 
 import numpy as np
-from problems import ALIVE, alive, scalar_predictor, two_state
+from problems import ALIVE, alive, two_state
 
 from tubecert.bounds.constants import ResidualConstants, WindConstants
 from tubecert.conditions.alone import NoGains
@@ -24,19 +24,16 @@ from tubecert.search.proposers import PROPOSERS
 
 F = Fraction
 KINDS = {"0": NoGains, "A": RateRecipe, "B": DistanceRecipe}
-NUMBERS = {
-    kind: tuple(item.name for item in fields(recipe) if item.name not in ("settling", "windows"))
-    for kind, recipe in KINDS.items()
-}
+NUMBERS = {kind: tuple(item.name for item in fields(recipe)) for kind, recipe in KINDS.items()}
 
 
 def exactly(x: float) -> Constant:
     return Constant(below=x, above=x)
 
 
-def wind(bound: str | None, *, size: float = 0.2, explained: float = 0.1) -> Wind:
+def wind(bound: str, *, size: float = 0.2, explained: float = 0.1) -> Wind:
     own = WindConstants(push=exactly(0.15), size=exactly(size), explained=exactly(explained))
-    return Wind(bound=None if bound is None else F(bound), constants=own)
+    return Wind(bound=F(bound), constants=own)
 
 
 REST = ResidualConstants(push=exactly(0.02), size=exactly(0.03))
@@ -48,18 +45,17 @@ PROBLEMS: dict[str, tuple[TubeProblem, str]] = {
     "constants that are enclosed": (alive(values=WIDE), "0AB"),
     "radii that were rounded": (alive(rho_r=F("0.7") * (1 + F(5, 10**10))), "0AB"),
     "a start near the plan": (alive(values={"initial_distance": 0.01}, horizon=F(1, 2)), "0AB"),
-    "any predictor": (alive(A_m=None), "0AB"),
+    "any predictor": (alive(predictor_gain=None), "0AB"),
     "a smooth projection": (alive(smooth=F(1, 4)), "0AB"),
     "a short horizon": (alive(horizon=F(1, 5)), "0AB"),
     "a plan that ends": (two_state(horizon=F(3)), "AB"),
     "B turns": (two_state(values=TURNING), "AB"),
     "a wind, B turns": (two_state(values=TURNING, wind=wind("0.05"), residual=REST), "B"),
     "a wind": (
-        two_state(values={"h": 0.9}, wind=wind("0.2"), residual=REST, A_m=scalar_predictor("40", 2)),
+        two_state(values={"h": 0.9}, wind=wind("0.2"), residual=REST, predictor_gain=F(40)),
         "B",
     ),
     "a wind that nothing is left of": (two_state(wind=wind("0")), "AB"),
-    "a wind that is looked for": (two_state(wind=wind(None)), ""),
     "parameters that are unknown": (two_state(residual=REST), "B"),
 }
 OF_GAINS = (F(200), F(10**9), F(40))  # where a search has nothing to say
@@ -112,7 +108,7 @@ def problems() -> list[TubeProblem]:
         made.append(
             alive(
                 values=values,
-                A_m=scalar_predictor(str(F(int(rng.integers(1, 90)), 10)), 2),
+                predictor_gain=F(int(rng.integers(1, 90)), 10),
                 horizon=None if k % 2 else F(int(rng.integers(1, 40)), 10),
             )
         )

@@ -128,6 +128,18 @@ def test_a_recipe_of_another_kind_proves_nothing(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_a_recipe_for_a_b_that_is_known_proves_nothing_for_one_that_is_not(kind):
+    problem, recipe = PROBLEMS["every term alive"][0], honest("every term alive", kind)
+    unknown = replace(problem, gained=True)
+    assert isinstance(check(problem, recipe), Proof)
+    assert not isinstance(check(unknown, recipe), Proof)
+    judgement = judge(unknown, theorem_of(KINDS[kind]), Proposal(decisive=recipe, beside={"least": recipe}))
+    assert judgement.verdict is Verdict.UNDECIDED
+    assert judgement.ultimate_radius is None
+    assert judgement.proof is None
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_what_only_looks_like_a_recipe_proves_nothing(kind):
     problem, recipe = PROBLEMS["every term alive"][0], honest("every term alive", kind)
     alike = type("Alike", (KINDS[kind],), {})

@@ -60,10 +60,9 @@ def reading(p: TubeProblem) -> Setting:
         values["drift_on_plan"] += rest
     wind = None
     if p.wind is not None:
-        own, bound = p.wind.constants, p.wind.bound
-        sizes = ball(own.push), ball(own.size), ball(own.explained)
-        wind = WindNumbers(*sizes, None if bound is None else exact(bound))
-    options = {"rate": p.rate, "horizon": p.horizon, "smooth": p.smooth, "A_m": p.A_m}
+        own = p.wind.constants
+        wind = WindNumbers(ball(own.push), ball(own.size), ball(own.explained), exact(p.wind.bound))
+    options = {"rate": p.rate, "horizon": p.horizon, "smooth": p.smooth, "predictor_gain": p.predictor_gain}
     turns = p.constants.B_x.above > 0
     return Setting(replace(system(), **options), Numbers(**values), p.rho, p.rho_a, wind, turns, rest)
 
