@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 import yaml
-from rechecked import CONFIGS, certified, examine, failing, respecified, unconfirmed
+from rechecked import CONFIGS, certified, examine, failing, respecified, sealed, unconfirmed
 from systems import SMALL
 
 from tubecert.errors import TubecertError
@@ -42,6 +42,10 @@ def grow(result, by=1.01):  # it was found to a thousandth of the width of the t
     result["clearance"][0]["clearance"] = [low * by, high * by]
 
 
+def ends_early(clearance):
+    clearance[1] = clearance[0] / 2
+
+
 FAULTS = {
     "a larger clearance": grow,
     "a thinner tube": lambda r: r["clearance"][0]["shape"].update(
@@ -54,6 +58,7 @@ FAULTS = {
     "the list removed": lambda r: r.pop("clearance"),
     "entries exchanged": lambda r: r["clearance"].reverse(),
     "no clearance": lambda r: r["clearance"][0].update(clearance=[0.0, 1.0]),
+    "a clearance that ends before it begins": lambda r: ends_early(r["clearance"][0]["clearance"]),
     "another verdict": lambda r: r["clearance"][0].update(verdict="undecided"),
     "it does not decide": lambda r: r["clearance"][0].update(decides=False, verdict="undecided"),
     "an unknown member": lambda r: r["clearance"][0].update(obstacle=1),
@@ -78,6 +83,8 @@ MOVES = {
         states=["x2", "x1"], disc={"center": ["1", "1"], "radius": "1"}
     ),
     "in no plane": lambda s: s["obstacles"][0].update(states=["x1", "x1"]),
+    "of no size": lambda s: s["obstacles"][0]["disc"].update(radius="0"),
+    "of less than no size": lambda s: s["obstacles"][0]["disc"].update(radius="-1/10"),
     "one more": lambda s: s["obstacles"].append(s["obstacles"][0]),
 }
 
@@ -114,6 +121,7 @@ def test_an_obstacle_that_is_met_refutes_unless_it_does_not_decide():
         ([(0, 3), (2, -2), (-3, 1), (3, 1), (-2, -2)], False),  # a pentagram
         ([(0, 0), (2, 0), (2, 0), (0, 2)], False),  # an edge without length
         ([(0, 0), (2, 0), (1, 0), (0, 2)], False),  # an edge that turns back
+        ([(0, 0), (2, 0), (1, 0)], False),  # nothing but edges that turn back
         ([(0, 0), (2, 0)], False),
     ],
 )
@@ -145,17 +153,53 @@ BENT = (
 )
 
 
-@pytest.mark.slow
-def test_a_tube_is_as_wide_as_its_metric_allows_anywhere_in_it():
+@pytest.fixture(scope="module")
+def bent():
     honest = certified(BENT, conditions="none")
     low, high = honest["result"]["clearance"][0]["shape"]["beside"]
     assert low < -0.07 < 0.07 < high
     assert not failing(examine(honest))
+    return honest
+
+
+@pytest.mark.slow
+def test_a_tube_is_as_wide_as_its_metric_allows_anywhere_in_it(bent):
     for k in (0, 1):
-        forged = copy.deepcopy(honest)
+        forged = copy.deepcopy(bent)
         own = forged["result"]["clearance"][k]["clearance"]
         own[:] = [end * 1.0001 for end in own]
         assert unconfirmed(forged)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("part", "k"), [(part, k) for part in ("diagonal", "beside") for k in (0, 1)])
+def test_every_number_of_a_shape_is_examined(bent, part, k):
+    forged = copy.deepcopy(bent)
+    for own in forged["result"]["clearance"]:
+        own["shape"][part][k] *= 0.99
+    assert any(name.startswith("W in the plane") for name, _ in failing(examine(sealed(forged))))
+
+
+NEXT_TO_THE_TUBE = {
+    "a corner": [["1/2", "0"], ["1", "1/2"], ["1", "-1/2"]],
+    "an edge": [["1/2", "-2"], ["1/2", "2"], ["2", "0"]],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", [0, 1, 2])
+@pytest.mark.parametrize("what", NEXT_TO_THE_TUBE)
+def test_every_edge_of_a_polygon_is_kept_away_from(turn, what):
+    """Whichever is the first."""
+    corners = NEXT_TO_THE_TUBE[what]
+    corners = corners[turn:] + corners[:turn]
+    polygon = {"obstacles": [{"states": ["x", "y"], "polygon": corners}]}
+    honest = certified(SMALL + yaml.safe_dump(polygon), conditions="none")
+    assert honest["result"]["clearance"][0]["verdict"] == "certified"
+    assert not failing(examine(honest))
+    forged = copy.deepcopy(honest)
+    grow(forged["result"])
+    assert any(name.startswith("clearance") for name, _ in failing(examine(sealed(forged))))
 
 
 @pytest.mark.parametrize(
