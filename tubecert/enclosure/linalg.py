@@ -19,6 +19,7 @@ _UNIT: Final = 2.0**-53
 _TINY: Final = 1e-300  # covers underflow in products
 _LOST: Final = 1e-320  # covers underflow of a rounding error that is scaled afterwards
 _ROOT_TINY: Final = 1e-150  # covers underflow below a square root
+_STEP: Final = 16  # powers of two by which a congruence proposed in floats scales a row
 
 
 def finite(m: Array) -> NDArray[np.bool_]:
@@ -156,11 +157,18 @@ def quadratic_form(v: Array, mid: Array, rad: Array) -> Interval:
 
 
 def whitening(mid: Array) -> Array:
-    """Floats T with T S T' close to the identity: a proposal, nothing is proven; I where S is not positive."""
+    """Floats T with T S T' close to the identity: a proposal, nothing is proven; I where S is not positive.
+
+    Whatever the units: S is scaled first to a diagonal near 1, by powers of two, in steps that leave it as it is where
+    units are alike.
+    """
     n = mid.shape[-1]
     bad = ~finite(mid)
-    d, v = np.linalg.eigh(np.where(bad[..., None, None], np.eye(n), mid))
+    safe = np.where(bad[..., None, None], np.eye(n), mid)
+    diagonal = np.abs(np.einsum("...ii->...i", safe))
+    scale = 2.0 ** (-_STEP * np.rint(np.log2(np.where(diagonal > 0, diagonal, 1.0)) / (2 * _STEP)))
+    d, v = np.linalg.eigh(scale[..., :, None] * safe * scale[..., None, :])
     ok = ~bad & (d[..., 0] > 1e-14 * np.abs(d[..., -1]))  # the eigenvectors of I may come with either sign
-    scale = np.where(ok[..., None], 1 / np.sqrt(np.where(d > 0, d, 1.0)), 1.0)
-    t = scale[..., :, None] * np.swapaxes(v, -1, -2)
+    root = np.where(ok[..., None], 1 / np.sqrt(np.where(d > 0, d, 1.0)), 1.0)
+    t = root[..., :, None] * np.swapaxes(v, -1, -2) * scale[..., None, :]
     return np.where(ok[..., None, None], t, np.eye(n))
