@@ -71,6 +71,7 @@ class _Synthesis:
             problem.model, problem.family, np.stack([lo, hi], axis=1), self.forms
         )
         self.unknowns = Unknowns(free)
+        self.width = hi - lo
         self.generator = np.random.default_rng(11)
         some = self.generator.uniform(lo, hi, (20 * len(problem.family.functions) + 20, len(lo)))
         self.forms.orthonormalise(np.concatenate([some, *(some * signs for signs in self.symmetries)]))
@@ -188,7 +189,7 @@ class _Synthesis:
         low, contraction = self._points(attack.low, attack.contraction)
         high, _ = self._points(attack.high, attack.contraction[:0])
         fresh = [
-            _new(points, old)
+            _new(points, old, self.width)
             for points, old in (
                 (low, program.low),
                 (high, program.high),
@@ -234,9 +235,9 @@ class _Synthesis:
             self.problem.progress(Step(phase=Phase.SYNTHESIS, name=words))
 
 
-def _new(points: Points, old: Points) -> Points:
-    """The points that are not there yet."""
-    known = [bool((np.abs(old.at - x).max(axis=1) > 1e-7).all()) for x in points.at]
+def _new(points: Points, old: Points, width: Array) -> Points:
+    """The points that are not there yet, in a box of a `width` (n,)."""
+    known = [bool((np.abs((old.at - x) / width).max(axis=1) > 1e-7).all()) for x in points.at]
     return points.kept(np.array(known, dtype=bool))
 
 

@@ -2,8 +2,9 @@
 
 In the states' own units a condition number depends on the units: a speed in mm/s makes another metric the best. With
 x = S z, S = diag(half-widths of the safe set), the metric in z is S^-1 W S^-1, and what is best there is best in
-every unit. The columns of a frame are scaled as well, so that all unknowns are of one size. B B', which is a floor of
-W, is measured by its own size, and C2 by the rate that is asked for: so the unit of time is gone, too.
+every unit. The columns of a frame and the functions of a family are scaled as well, so that all unknowns are of one
+size. B B', which is a floor of W, is measured by its own size, and C2 by the rate that is asked for: so the unit of
+time is gone, too.
 Untrusted: W is proven in the states' own coordinates.
 """
 
@@ -23,24 +24,26 @@ from tubecert.model import ControlAffineModel
 from tubecert.synthesis.family import MetricFamily
 
 Choice = Literal["auto", "identity"]
+_POINTS = 256  # of the safe set at which functions are looked at
 
 
 @dataclass(frozen=True, slots=True)
 class Coordinates:
     """`states` (n,): the diagonal of S; `columns` (n,): by what the columns of the frame are multiplied.
 
-    `input`: what |S^-1 B| is measured in; `rate`: what rates are measured in, in 1/s.
+    `functions`: what the g_k (K,) are measured in; `input`: |S^-1 B|; `rate`: rates, in 1/s.
     """
 
     states: Array
     columns: Array
+    functions: Array
     input: float = 1.0
     rate: float = 1.0
 
     @property
     def entries(self) -> Array:
-        """What an unknown of V stands for, (n, n)."""
-        return np.asarray(self.columns[:, None] * self.columns)
+        """What an unknown of the V_k stands for, (K, n, n)."""
+        return np.asarray(np.outer(self.columns, self.columns) / self.functions[:, None, None])
 
 
 def coordinates(
@@ -50,14 +53,36 @@ def coordinates(
     half_widths: Sequence[Fraction] = (),
 ) -> Coordinates:
     """S: half-widths (those of the safe set, if none are given), or ones."""
-    n = len(safe_set)
     if choice == "identity":
-        return Coordinates(np.ones(n), np.ones(n))
+        return unscaled(family)
     half = half_widths or [(high - low) / 2 for low, high in safe_set]
     states = np.array([float(width) for width in half])
+    functions = _sizes(functions_at(family, safe_set))
     if family.flat:
-        return Coordinates(states, states)
-    return Coordinates(states, 1 / np.linalg.norm(_frame(family, safe_set) / states[:, None], axis=0))
+        return Coordinates(states, states, functions)
+    columns = 1 / np.linalg.norm(_frame(family, safe_set) / states[:, None], axis=0)
+    return Coordinates(states, columns, functions)
+
+
+def unscaled(family: MetricFamily) -> Coordinates:
+    """The states' own units."""
+    ones = np.ones(len(family.states))
+    return Coordinates(ones, ones, np.ones(len(family.functions)))
+
+
+def functions_at(family: MetricFamily, safe_set: Sequence[tuple[Fraction, Fraction]]) -> Array:
+    """The functions g_k at random points of the safe set, (P, K)."""
+    ends = np.array([[float(low), float(high)] for low, high in safe_set])
+    points = np.random.default_rng(7).uniform(ends[:, 0], ends[:, 1], (_POINTS, len(ends)))
+    with np.errstate(all="ignore"):
+        values = Tape(family.functions, family.states).run_floats(list(points.T), (_POINTS,)).T
+    return np.asarray(values[np.isfinite(values).all(axis=1)])
+
+
+def _sizes(values: Array) -> Array:
+    """Powers of two near the largest magnitudes (K,) of functions at points (P, K); 1 for what vanishes."""
+    largest = np.abs(values).max(axis=0, initial=0.0)
+    return np.asarray(2.0 ** np.rint(np.log2(np.where(largest > 0, largest, 1.0))))
 
 
 def _frame(family: MetricFamily, safe_set: Sequence[tuple[Fraction, Fraction]]) -> Array:

@@ -19,7 +19,7 @@ from tubecert.expression import Expression, free_symbols
 from tubecert.expression.matrix import along, combine, multiply
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.conic import triangle
-from tubecert.synthesis.coordinates import Coordinates
+from tubecert.synthesis.coordinates import Coordinates, unscaled
 from tubecert.synthesis.family import MetricFamily
 
 
@@ -107,8 +107,7 @@ class FormsTape:
     def __init__(
         self, model: ControlAffineModel, family: MetricFamily, scaled: Coordinates | None = None
     ) -> None:
-        ones = np.ones(len(model.states))
-        self._scaled = Coordinates(ones, ones) if scaled is None else scaled
+        self._scaled = unscaled(family) if scaled is None else scaled
         self.states, self.inputs, self.functions = model.states, len(model.inputs), len(family.functions)
         E, g = family.frame, (family.functions,)
         A = combine(1, multiply(model.f_x, E), -1, along(E, model.f, model.states))
@@ -163,8 +162,8 @@ class FormsTape:
             input=B @ _t(B) / self._scaled.input**2,
             P=_t(N) @ E,
             Q=_t(N) @ A,
-            values=g @ self._basis,
-            rates=rates @ self._basis,
+            values=g / self._scaled.functions @ self._basis,
+            rates=rates / self._scaled.functions @ self._basis,
             unit=self._scaled.rate,
         )
 

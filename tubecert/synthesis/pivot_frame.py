@@ -35,13 +35,18 @@ _POINTS = 400
 
 
 def pivot_frame(model: ControlAffineModel, safe_set: Sequence[tuple[Fraction, Fraction]]) -> Matrix | None:
-    """E (n, n) for the pivot rows that keep it smallest on random points of the safe set; None if there are none."""
+    """E (n, n) for the pivot rows that keep it smallest on random points of the safe set; None if there are none.
+
+    Small in half-widths of the set: in the states' own units that would depend on them.
+    """
     ends = np.array([[float(lo), float(hi)] for lo, hi in safe_set])
     points = np.random.default_rng(17).uniform(ends[:, 0], ends[:, 1], (_POINTS, len(ends)))
+    half = (ends[:, 1] - ends[:, 0]) / 2
+    units = (half / half[:, None]).reshape(-1, 1)
     best: tuple[float, Matrix] | None = None
     for frame in pivot_frames(model):
         tape = Tape([e for row in frame for e in row], model.states)
-        size = float(np.abs(tape.run_floats(list(points.T), (len(points),))).max())
+        size = float(np.abs(tape.run_floats(list(points.T), (len(points),)) * units).max())
         if np.isfinite(size) and (best is None or size < best[0]):
             best = size, frame
     return best[1] if best else None

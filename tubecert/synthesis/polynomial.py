@@ -175,7 +175,7 @@ def _unit(problem: SynthesisProblem, frame: Array, mask: NDArray[np.bool_]) -> A
     n = frame.shape[1]
     if problem.target is None:
         return np.broadcast_to(np.eye(n), frame.shape)
-    target = np.where(mask | mask.T, problem.target, 0.0) / problem.scaled.entries
+    target = np.where(mask | mask.T, problem.target, 0.0) / problem.scaled.entries[0]
     return np.asarray(frame @ target @ frame.swapaxes(1, 2))
 
 
@@ -215,7 +215,7 @@ def _row_signs(N: Matrix, model: ControlAffineModel, box: Array, sign: Array) ->
     points = np.random.default_rng(8).uniform(box[:, 0], box[:, 1], (3, len(box)))
     here, there = _values(N, model, points), sign[:, None] * _values(N, model, points * sign)
     rows = np.where(np.sum(here * there, axis=(0, 1)) < 0, -1.0, 1.0)
-    return rows if np.allclose(there, here * rows, rtol=1e-9, atol=1e-9 * np.abs(here).max()) else None
+    return rows if np.allclose(there, here * rows, rtol=1e-9, atol=1e-9 * np.abs(here).max(axis=0)) else None
 
 
 def _placed(

@@ -17,22 +17,19 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import whitening
-from tubecert.enclosure.tape import Tape
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.attack import Attack, Attacker
-from tubecert.synthesis.coordinates import Choice
+from tubecert.synthesis.coordinates import Choice, functions_at
 from tubecert.synthesis.family import MetricFamily
 from tubecert.synthesis.forms import FormsTape
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
-from tubecert.synthesis.sampling import floats
 from tubecert.verdict import Verdict
 
 _DIGITS = (2, 3, 4, 5, 6, 7, 9, 12)
 _WORTH, _SHARP = 1.005, 1.0002  # a shorter metric may have a condition number larger by this factor
 _ALIKE = 2e-3  # and differs by this share in any direction
-_POINTS = 256  # at which it is compared
 
 Coefficients = tuple[tuple[tuple[Fraction, ...], ...], ...]
 
@@ -80,7 +77,7 @@ def shortest_proven(
     n = len(problem.model.states)
     if values.shape != (len(problem.family.functions), n, n):
         return Rejected(outcome=WrongShape(route=proposal.route))
-    functions = _at_points(problem)
+    functions = functions_at(problem.family, problem.safe_set)
     first, *rest = _worth_proving(problem, values, rate, functions)
     known = proofs or Proofs()
 
@@ -132,16 +129,6 @@ def _worth_proving(problem: SynthesisProblem, values: Array, rate: Fraction, fun
             if found.kappa <= worth * full.kappa and found.shortfall <= 0.5 * min(full.shortfall, 0.0):
                 return [digits, most]
     return [most]
-
-
-def _at_points(problem: SynthesisProblem) -> Array:
-    """The functions g_k at random points of the safe set, (P, K)."""
-    lo, hi = floats(problem.safe_set)
-    points = np.random.default_rng(7).uniform(lo, hi, (_POINTS, len(lo)))
-    family = problem.family
-    with np.errstate(all="ignore"):
-        values = Tape(family.functions, family.states).run_floats(list(points.T), (_POINTS,)).T
-    return np.asarray(values[np.isfinite(values).all(axis=1)])
 
 
 def distance(values: Array, other: Array, functions: Array) -> float:
