@@ -204,30 +204,88 @@ initial_state: {{at: [0.02*a, 0]}}
 tube: {{half_widths: {{q: 0.2*a, w: b}}}}
 """
 ONES = dict.fromkeys("abcT", 1)
-any_unit = st.sampled_from([1, 57, 1000, Fraction(1, 8), Fraction(1, 1000)])
+# q to the third power: W moves with q and q^2, whose sizes are far apart where the unit of q is
+CUBIC = """
+tubecert: 1
+name: cubic
+system:
+  states: [q, w]
+  inputs: [u]
+  parameters: {{a: {a}, b: {b}, c: {c}, T: {T}}}
+  f: ["T*a*(w/b - (q/a)**3)", "b*T*((q/a)**3 - 0.5*w/b + 2*(q/a)*(w/b))"]
+  B: [[0], ["b*T*2/c"]]
+safe_set: {{q: [-a, a], w: [-4*b, 4*b]}}
+uncertainty: {{h: [0]}}
+trajectory: {{kind: equilibrium, at: [0, 0], input: [0]}}
+"""
+any_unit = st.sampled_from([1, 57, 1000, 10**6, Fraction(1, 8), Fraction(1, 1000), Fraction(1, 10**6)])
+FAR_APART = [
+    {"a": Fraction(1, 1000), "b": 1000, "c": 1, "T": 1},
+    {"a": 1000, "b": Fraction(1, 1000), "c": 10**6, "T": 57},
+    {"a": Fraction(1, 10**5), "b": 10**4, "c": 10**9, "T": 10**6},
+    {"a": 10**6, "b": 10**6, "c": Fraction(1, 10**9), "T": Fraction(1, 1000)},
+]
+ROUTES = ["cegis", "sos"]
+
+
+def least(text, units, *, rate, **wanted):
+    """kappa over both floors, in a system whose rates are of the unit of time."""
+    spec = load_text(text.format(**units))
+    asked = Request(model=build(spec), safe_set=spec.safe_set, coordinates="auto", **wanted)
+    ladder = Ladder(asked)
+    found = [ladder.metric(rate * Fraction(units["T"]), floor) for floor in FLOORS]
+    assert None not in found, [attempt.outcome for attempt in ladder.attempts]
+    return [metric.proposal.kappa for metric in found]
+
+
+def least_driven(units, route):
+    half_widths = (Fraction(units["a"]) / 5, Fraction(units["b"]))
+    return least(DRIVEN, units, rate=Fraction(7, 4), degree=0, routes=routes(route), half_widths=half_widths)
+
+
+@cache
+def of_driven(route):
+    return least_driven(ONES, route)
 
 
 @pytest.mark.slow
-@given(st.fixed_dictionaries(dict.fromkeys("abcT", any_unit)), st.sampled_from(["cegis", "sos"]))
+@given(st.fixed_dictionaries(dict.fromkeys("abcT", any_unit)), st.sampled_from(ROUTES))
 @settings(deadline=None, max_examples=4)
 def test_what_is_least_does_not_depend_on_the_units_of_inputs_and_time(units, route):
-    """kappa over both floors: B B' is as large as its unit, and the rows of C2 have 1/s in them."""
-    found = []
-    for each in (ONES, units):
-        spec = load_text(DRIVEN.format(**each))
-        ladder = Ladder(
-            Request(
-                model=build(spec),
-                safe_set=spec.safe_set,
-                routes=routes(route),
-                degree=0,
-                coordinates="auto",
-                half_widths=(Fraction(each["a"]) / 5, Fraction(each["b"])),
-            )
+    """B B' is as large as its unit, and the rows of C2 have 1/s in them."""
+    assert least_driven(units, route) == pytest.approx(of_driven(route), rel=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("units", FAR_APART)
+@pytest.mark.parametrize("route", ROUTES)
+def test_nor_where_units_are_far_apart(units, route):
+    """By 1e6 or 1e9: W has entries 1e12, or 1e18, apart, and is proven in the states' own units."""
+    assert least_driven(units, route) == pytest.approx(of_driven(route), rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("route", ROUTES)
+def test_nor_where_a_metric_moves_with_powers_of_a_state(route):
+    wanted = {"rate": Fraction(1, 2), "degree": 2, "routes": routes(route)}
+    reference = least(CUBIC, ONES, **wanted)
+    for units in FAR_APART[2:]:
+        assert least(CUBIC, units, **wanted) == pytest.approx(reference, rel=1e-4)
+
+
+def test_the_frame_of_a_moving_input_does_not_depend_on_units():
+    """The pivot rows are those that keep it small in half-widths: 1/(x + 10), not 1/x, whatever x is measured in."""
+    frames = []
+    for a, b, c in ((1, 1, 1), (1000, Fraction(1, 10**6), 1)):
+        spec = load_text(TURNING.format(a=a, b=b, c=c))
+        frame = metric_family(build(spec), degree=0, safe_set=spec.safe_set).frame
+        x = [0.1 * a, 0.2 * b, 0.05 * c]
+        values = Tape([e for row in frame for e in row], spec.states).run_floats(
+            [np.array([q]) for q in x], (1,)
         )
-        metrics = [ladder.metric(Fraction(7, 4) * Fraction(each["T"]), floor) for floor in FLOORS]
-        found.append([metric.proposal.kappa for metric in metrics])
-    assert found[1] == pytest.approx(found[0], rel=2e-3)
+        scale = np.array([a, b, c], dtype=float)
+        frames.append(values.reshape(3, 3) * scale / scale[:, None])
+    assert frames[1] == pytest.approx(frames[0], rel=1e-9)
 
 
 @pytest.mark.slow
