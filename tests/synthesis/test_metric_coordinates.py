@@ -221,7 +221,7 @@ trajectory: {{kind: equilibrium, at: [0, 0], input: [0]}}
 any_unit = st.sampled_from([1, 57, 1000, 10**6, Fraction(1, 8), Fraction(1, 1000), Fraction(1, 10**6)])
 FAR_APART = [
     {"a": Fraction(1, 1000), "b": 1000, "c": 1, "T": 1},
-    {"a": 1000, "b": Fraction(1, 1000), "c": 10**6, "T": 57},
+    {"a": 1000, "b": Fraction(1, 10**6), "c": 10**6, "T": 57},
     {"a": Fraction(1, 10**5), "b": 10**4, "c": 10**9, "T": 10**6},
     {"a": 10**6, "b": 10**6, "c": Fraction(1, 10**9), "T": Fraction(1, 1000)},
 ]
