@@ -23,6 +23,37 @@ CONFIGS = {  # each on one other processor; all of them on several are what `.ci
     "oldest": ("two_state", "state_dependent_input"),
 }
 
+# a place of a largest value in an ellipsoid, two that are mirror images, and two tubes that are equally good
+PLACES = {
+    "ellipsoid": (
+        'f: ["-x + y", "-y + 0.3*sin(x) + z", "-2*z + 0.3*y*x"]',
+        'rate: 0.3, dual_metric: [[1, "-0.2", 0], ["-0.2", 1.5, "-0.5"], [0, "-0.5", 2]]',
+        "half_widths: {x: 0.2}",
+    ),
+    "mirrored": (
+        'f: ["-x + y", "-y + 0.3*sin(x)"]',
+        'rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", "2 + 0.2*cos(x)"]]',
+        "half_widths: {x: 0.2, y: 0.3}",
+    ),
+    "tied": (
+        'f: ["-x + y", "-y + 0.3*sin(x)"]',
+        'rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", "2 + 0.2*x"]]',
+        "epsilon: 0.2, rho_a: 0.1",
+    ),
+}
+_SPEC = """
+tubecert: 1
+name: {name}
+system: {{states: [{states}], inputs: [u], {f}, B: [{B}]}}
+safe_set: {{{safe_set}}}
+uncertainty: {{h: ["0.1*sin(t) + 0.05*x"]}}
+trajectory: {{kind: equilibrium, at: [{zeros}], input: [0]}}
+initial_state: {{at: [{start}]}}
+metric: {{{metric}}}
+tube: {{{tube}, coordinates: auto}}
+conditions: {{decides: B}}
+"""
+
 _RUN = """
 import ctypes, hashlib, json, sys
 from pathlib import Path
@@ -55,6 +86,7 @@ def dispatched():
 PROCESSORS = {
     "this one": {"OPENBLAS_NUM_THREADS": "2"},
     "Haswell": {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"},
+    "Nehalem": {"OPENBLAS_CORETYPE": "Nehalem", "OPENBLAS_NUM_THREADS": "1"},
     "oldest": {
         "OPENBLAS_CORETYPE": "Prescott",
         "OPENBLAS_NUM_THREADS": "1",
@@ -64,13 +96,12 @@ PROCESSORS = {
 }
 
 
-def certified_on(processor, folder, configs):
-    """The kernels of BLAS, and the hashes of the shipped systems' results with an empty cache."""
-    paths = [str(ROOT / "configs" / f"{name}.yaml") for name in configs]
+def certified_on(processor, folder, paths):
+    """The kernels of BLAS, and the hashes of specifications' results with an empty cache."""
     outside = {name: value for name, value in os.environ.items() if name not in PROCESSORS["oldest"]}
     cache = {"XDG_CACHE_HOME": str(folder / processor), "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "-c", _RUN, *paths],
+        [sys.executable, "-c", _RUN, *map(str, paths)],
         env={**outside, **cache, **PROCESSORS[processor]},
         capture_output=True,
         text=True,
@@ -86,12 +117,35 @@ def certified_on(processor, folder, configs):
 def test_results_are_the_same_on_every_processor(processor, tmp_path):
     """As on this one, where other tests of this run may have made them."""
     configs = CONFIGS[processor]
-    kernel, hashes = certified_on(processor, tmp_path, configs)
-    texts = {name: (ROOT / "configs" / f"{name}.yaml").read_text("utf-8") for name in configs}
-    here = {name: digest(result(text)) for name, text in texts.items()}
-    assert dict(zip(configs, hashes, strict=True)) == here
+    paths = [ROOT / "configs" / f"{name}.yaml" for name in configs]
+    kernel, hashes = certified_on(processor, tmp_path, paths)
+    here = [digest(result(path.read_text("utf-8"))) for path in paths]
+    assert dict(zip(configs, hashes, strict=True)) == dict(zip(configs, here, strict=True))
     if platform.machine() == "x86_64" and kernel is not None and processor == "oldest":
         assert kernel != certified_on("this one", tmp_path, ())[0], "the processor was not played"
+
+
+@pytest.mark.slow
+def test_places_and_what_is_equally_good_are_the_same_for_every_kernel_of_blas(tmp_path):
+    """Last digits of LAPACK would be told in places, and decide between mirror images and coordinates that tie."""
+    paths = []
+    for name, (f, metric, tube) in PLACES.items():
+        states = "xyz"[: metric.count("], [") + 1]
+        text = _SPEC.format(
+            name=name,
+            f=f,
+            metric=metric,
+            tube=tube,
+            states=", ".join(states),
+            B=", ".join("[1]" if s == states[-1] else "[0]" for s in states),
+            safe_set=", ".join(f"{s}: [-1, 1]" for s in states),
+            zeros=", ".join("0" for _ in states),
+            start=", ".join(["0.05", "0", "0"][: len(states)]),
+        )
+        paths.append(tmp_path / f"{name}.yaml")
+        paths[-1].write_text(text, "utf-8")
+    one, other = (certified_on(processor, tmp_path, paths)[1] for processor in ("Haswell", "Nehalem"))
+    assert dict(zip(PLACES, one, strict=True)) == dict(zip(PLACES, other, strict=True))
 
 
 def digest(found):

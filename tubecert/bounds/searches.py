@@ -14,7 +14,7 @@ from tubecert.bounds.constants import Constant, Witness
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.domain import Range
-from tubecert.enclosure.interval import Interval, fraction_bounds, sqrt
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
 from tubecert.enclosure.objective import Objective, SumOfNorms, size_of
 from tubecert.enclosure.questions import Domain
 from tubecert.model import TIME, ControlAffineModel
@@ -25,6 +25,7 @@ from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that
 _WORTH = 30_000  # boxes after which such a constant stays as it is;
+_DIGITS = 6  # of what the tube reaches: to these a place is told
 _MANY = 8  # of more states than that each box takes longer, and fewer are worth it
 Spent = Callable[[str, int], None]
 
@@ -75,6 +76,13 @@ class Searches:
         if self.coordinates is None:
             return Ball(self.rho)
         return Ellipsoid(self.coordinates, self.rho, self.sides or (np.inf,) * len(self.model.states))
+
+    @property
+    def reach(self) -> Array:
+        """How far the states can be from the plan's where half-widths are left out, nearly, (n,)."""
+        if self.coordinates is None:
+            return np.full(len(self.model.states), self.rho)
+        return self.rho * np.sqrt([float(row[i]) for i, row in enumerate(self.coordinates.spread)])
 
     def over_tube(self, name: str, objective: Objective, effort: Effort) -> Supremum:
         """A supremum over the tube, with an effort of its own."""
@@ -130,7 +138,11 @@ class Searches:
         return Constant(below=float(root.lo), above=float(root.hi), at=self._witness(found))
 
     def _witness(self, found: Supremum) -> Witness:
-        """Where the value was found; states that do not matter are taken from the plan."""
+        """Where the value was found, nearly; states that do not matter are taken from the plan.
+
+        The state is told to some digits of what the tube reaches: the last ones are LAPACK's, and differ between
+        processors.
+        """
         t = self.plan.moment(found.at)
         if t is None and not self.plan.is_constant:  # a part of the plan that stays: any time will do
             t = 0.0
@@ -142,4 +154,6 @@ class Searches:
         which = [i for i, name in enumerate(states) if name in found.at]
         if isinstance(self.section, Ellipsoid) and which:  # the others are such that the point lies in it
             x = origin + self.section.completed(which, (x - origin)[None, which])[0]
-        return Witness(t=t, x=tuple(map(float, x)))
+        places = _DIGITS - 1 - np.floor(np.log10(np.maximum(self.reach, 1e-300))).astype(int)
+        near = (round(float(far), int(digits)) for far, digits in zip(x - origin, places, strict=True))
+        return Witness(t=t, x=tuple(float(a) + far for a, far in zip(origin, near, strict=True)))

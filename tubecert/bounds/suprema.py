@@ -135,10 +135,7 @@ class Suprema(Searches):
             return None
         if free_symbols(row[0] for row in matrices[0]) & set(dict(self.model.parameters)):
             return None
-        spread = self.coordinates.spread
-        sides = self.sides or (np.inf,) * len(spread)
-        reach = [self.rho * float(row[i]) ** 0.5 * (1 - _SAME) for i, row in enumerate(spread)]
-        if any(side < far for side, far in zip(sides, reach, strict=True)):  # half-widths count, too
+        if self.sides and np.any(self.sides < self.reach * (1 - _SAME)):  # half-widths count, too
             return None
         try:
             return NormOverRest(matrices[0], self.model.states, self.plan.x, self.coordinates, self.rho)

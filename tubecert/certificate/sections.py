@@ -41,6 +41,7 @@ from tubecert.claims.assumptions import (
 )
 from tubecert.claims.family import Assumption
 from tubecert.enclosure.constant import printable_above, printable_below
+from tubecert.enclosure.interval import Interval
 from tubecert.expression import number_text
 from tubecert.metric.geodesic import GeodesicTest
 from tubecert.metric.verify import MetricProof
@@ -139,19 +140,28 @@ def _period_text(q: Fraction, of_pi: bool) -> str:
 
 
 def metric_data(spec: Spec, proof: MetricProof) -> MetricData:
-    """`result.metric` as far as C1-C3 on the safe set tell."""
+    """`result.metric` as far as C1-C3 on the safe set tell.
+
+    The margin is that of the rate as it is printed: a small difference would tell rounding errors of the whole.
+    """
     metric = spec.metric
     if metric is None:
         raise ValueError("a proof is about a metric")
+    largest = _printable(proof.largest_rate)
     return MetricData(
         rate=metric.rate,
         dual_metric=tuple(map(tuple, canonical(spec)["metric"]["dual_metric"])),
         verdict=proof.verdict,
-        margin=_printable(proof.margin),
-        largest_rate=_printable(proof.largest_rate),
+        margin=None if largest is None else _beyond(largest, metric.rate),
+        largest_rate=largest,
         lower_on_set=_printable(proof.lower_on_set),
         upper_on_set=_printable(proof.upper_on_set),
     )
+
+
+def _beyond(rate: Constant, asked: Fraction) -> Constant:
+    margin = Interval(rate.below, rate.above) - Interval.of(asked)
+    return Constant(below=float(margin.lo), above=float(margin.hi)).printable()
 
 
 def _printable(value: Constant | None) -> Constant | None:

@@ -39,6 +39,8 @@ _UNKNOWN: Final = 1e300  # an overestimate of this size tells nothing about its 
 _PROBES: Final = 64  # boxes whose corners are tried as points, per round
 _ALONE: Final = 100_000  # boxes after which a supremum falls apart
 _PARTS: Final = 32
+_ALIKE: Final = 1e-13  # values that are no closer to each other differ, whatever rounded them
+_SAME_PLACE: Final = 1e-9  # of the extent of the domain
 _Boxes: TypeAlias = tuple[Array, Array, Array]  # lower corners (N, d), upper ones, and a bound (N,) for each
 
 
@@ -207,7 +209,7 @@ class Search:
             part, [(lo[take], hi[take], bound[take]) for take in taken], self.effort.workers, ready
         )
         for each in found:
-            if each.below > self.below:
+            if _exceeds(each.below, self.below):
                 self.below, self.at = each.below, each.at
         return np.array([each.above for each in found])
 
@@ -268,17 +270,23 @@ class Search:
         self.settled = max(self.settled, float(bound.max(initial=-np.inf)))
 
     def _probe(self, points: Array) -> Steps[None]:
-        """Raise `below` by values at points proven to lie in the domain."""
+        """Raise `below` by values at points proven to lie in the domain.
+
+        Of places that are alike, as mirror images are, one is chosen by where it is: last digits differ between
+        processors.
+        """
         yield (moved := Inside(self.variables, points))
         lo, hi = moved.answer
         if not len(lo):
             return
         yield (values_at := Values(lo[:, : self.own], hi[:, : self.own]))
-        values = values_at.answer
-        best = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
-        if values[best] > self.below:
+        values = np.where(np.isnan(values_at.answer), -np.inf, values_at.answer)
+        places = 0.5 * (lo + hi)
+        alike = np.flatnonzero(~_exceeds(values.max(), values))
+        best = alike[_foremost(places[alike] / np.where(self.extent > 0, self.extent, 1.0))]
+        if _exceeds(values[best], self.below):
             self.below = float(values[best])
-            self.at = {v: float(x) for v, x in zip(self.variables, 0.5 * (lo + hi)[best], strict=True)}
+            self.at = {v: float(x) for v, x in zip(self.variables, places[best], strict=True)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -309,6 +317,17 @@ class _Part:
             _, _, bound = answered(search.search(*boxes), self.objective, self.domain)
         above = float(max(search.settled, bound.max(initial=-np.inf)))
         return _Held(below=search.below, above=above, at=search.at, boxes=search.count)
+
+
+def _exceeds(value: float, other: Array | float) -> NDArray[np.bool_]:
+    """Whether a value is larger than others by more than a rounding."""
+    return np.asarray(value > other + np.where(np.isfinite(other), _ALIKE * np.abs(other), 0.0))
+
+
+def _foremost(places: Array) -> int:
+    """The last of places (P, d) in the order of their coordinates, the first of which counts most."""
+    order = np.lexsort(np.round(places.T[::-1] / _SAME_PLACE)) if places.shape[1] else [0]
+    return int(order[-1])
 
 
 def _shared(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Context, Decimal
 from fractions import Fraction
+from functools import partial, reduce
 from math import sqrt
 
 import numpy as np
@@ -25,6 +26,7 @@ _TIMES = 17
 _DIRECTIONS = 48
 _PASSES = 4
 _DIGITS = Context(prec=9)
+_ALIKE = 1e-9
 _INSIDE = 0.97  # of the room in the safe set: samples may miss the widest place
 
 
@@ -84,7 +86,7 @@ def propose(model: ControlAffineModel, plan: Plan, wish: Wish) -> tuple[Coordina
             break
         around = _values(dual, _samples(centres, S, level, level * widths, wish.box))
         candidates = [around.mean(axis=0), *_values(dual, centres[:: max(1, len(centres) // 4)])]
-        S = min(map(_factor, candidates), key=lambda each: _condition(around, each))
+        S = reduce(partial(_better, around), map(_factor, candidates))
     S = S * sqrt(_spectrum(around, S)[0])
     sides = tuple(Fraction(float(side)) for side in level * widths)
     if wish.asked is not None:
@@ -134,6 +136,11 @@ def _spectrum(duals: Array, S: Array) -> tuple[float, float]:
 def _condition(duals: Array, S: Array) -> float:
     least, greatest = _spectrum(duals, S)
     return greatest / least
+
+
+def _better(duals: Array, S: Array, other: Array) -> Array:
+    """The other one, if it is better by more than a rounding: ties would be decided by the processor."""
+    return other if _condition(duals, other) < (1 - _ALIKE) * _condition(duals, S) else S
 
 
 def _factor(dual: Array) -> Array:
