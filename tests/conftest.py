@@ -10,12 +10,28 @@ from functools import cache
 import pytest
 import shared
 from hypothesis import HealthCheck, settings
+from hypothesis.database import DirectoryBasedExampleDatabase
+from hypothesis.internal.conjecture import providers
+from hypothesis.internal.constants_ast import Constants
 
 from tubecert.cli import process
 
 # how long an example takes is the machine's affair, and its other users'
 settings.register_profile(
-    "tests", deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow]
+    "tests",
+    deadline=None,
+    max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize=True,
+    database=None,
+)
+# new examples each time: one that fails is told with what repeats it, and tried first from then on
+settings.register_profile(
+    "explore",
+    settings.get_profile("tests"),
+    derandomize=False,
+    database=DirectoryBasedExampleDatabase(".hypothesis/examples"),
+    print_blob=True,
 )
 settings.load_profile("tests")
 
@@ -30,6 +46,12 @@ gc.set_threshold(
     50_000, 20, 50
 )  # little of what tests make is in cycles, and looking for it costs a twentieth
 gc.disable()  # thousands of tests are collected, and none of them is garbage
+
+
+def pytest_sessionstart():
+    """Constants of the modules that are loaded are tried as well: which ones these are depends on the other tests."""
+    if settings.default.derandomize:
+        providers._get_local_constants = Constants
 
 
 @pytest.hookimpl(tryfirst=True)
