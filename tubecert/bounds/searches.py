@@ -25,7 +25,7 @@ from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that
 _WORTH = 30_000  # boxes after which such a constant stays as it is;
-_DIGITS = 6  # of what the tube reaches: to these a place is told
+_DIGITS = 10  # of what the tube reaches: to these a place is told
 _MANY = 8  # of more states than that each box takes longer, and fewer are worth it
 Spent = Callable[[str, int], None]
 
