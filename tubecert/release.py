@@ -1,3 +1,3 @@
 """The version of this release: read by what is recorded, kept and shown, and by the build."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
