@@ -99,9 +99,9 @@ def _gains(result: Result) -> list[RenderableType]:
         if any(row.decides for row in found):
             body.append(
                 Text(
-                    "Each row was proven on its own: do not take omega from one row and Gamma from another. The row "
-                    "marked * decides the verdict. omega is in rad/s. Gains are the least that are proven, so "
-                    "a margin of next to nothing is no sign of danger.",
+                    "Each row stands on its own: do not take omega from one row and Gamma from another. The row marked "
+                    "* decides the verdict. omega is in rad/s. Gains of a row that is certified are the least that "
+                    "were proven, so a margin of next to nothing is no sign of danger.",
                     style="dim",
                 )
             )

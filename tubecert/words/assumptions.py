@@ -26,7 +26,8 @@ _FIXED: dict[type[Assumption], str] = {
     LeastFeedback: "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, "
     "section 0); the controller acts in continuous time and exactly, "
     "evaluates f(x*) + B(x*) u* itself and never the derivative of a stored plan",
-    StraightGeodesics: "minimising geodesics are straight lines, which the constant metric makes unique",
+    StraightGeodesics: "the controller takes the straight line for the minimising geodesic; where the metric is "
+    "constant, as here, it is the only one",
     StartAtRest: "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's "
     "ball",
     HardProjection: "the projection is hard",
