@@ -53,8 +53,8 @@ _CUT = (
 )
 _SHARES = (
     "Shares of what the contraction can make good at the edge of the proven tube, from above. What has a large share "
-    "makes the tube wide; a better plan or model helps there. What is missing to 100 % is the margin. The gains of each "
-    "certificate were chosen by themselves, so columns need not agree."
+    "makes the tube wide; a better plan or model helps there. What is missing to 100 % is the margin. The gains of "
+    "each certificate were chosen by themselves, so columns need not agree."
 )
 _NO_LIMITS = (
     "The specification gives no limits of the inputs, so nothing is claimed of them: the curve is the plan's."
