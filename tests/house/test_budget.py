@@ -1,0 +1,75 @@
+"""How large each room may be. Numbers are lowered when a room shrinks, and never raised; a new room has its own row."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from operator import gt
+from pathlib import Path
+
+import tubecert
+
+PACKAGE = Path(tubecert.__file__).parent
+TESTS = Path(__file__).parents[1]
+OWN = "."  # the modules beside the rooms
+BUDGET = {  # room: lines, modules, classes
+    ".": (1968, 18, 31),
+    "bounds": (2369, 15, 21),
+    "certificate": (1366, 9, 44),
+    "checking": (451, 4, 5),
+    "claims": (836, 12, 76),
+    "cli": (3525, 33, 23),
+    "conditions": (1688, 16, 22),
+    "enclosure": (2728, 17, 38),
+    "expression": (2560, 15, 16),
+    "kinds": (683, 7, 19),
+    "library": (2702, 17, 24),
+    "lint": (1070, 8, 3),
+    "metric": (523, 3, 4),
+    "model": (556, 5, 1),
+    "pipeline": (2314, 16, 13),
+    "planner": (708, 5, 10),
+    "recheck": (11539, 79, 124),
+    "report": (5792, 43, 44),
+    "search": (961, 8, 6),
+    "simulate": (6189, 36, 92),
+    "spec": (5448, 30, 42),
+    "stages": (1310, 10, 13),
+    "sweep": (495, 5, 8),
+    "synthesis": (4017, 28, 37),
+    "trajectory": (949, 7, 8),
+    "tube": (647, 4, 6),
+    "words": (816, 6, 0),
+}  # fmt: skip
+FUNCTIONS = 4330  # of the package
+TEST_LINES = 38_500
+
+
+def counted() -> dict[str, tuple[int, int, int]]:
+    """Lines, modules and classes by room."""
+    lines, modules, classes = Counter[str](), Counter[str](), Counter[str]()
+    for path in PACKAGE.rglob("*.py"):
+        inside = path.relative_to(PACKAGE).parts
+        room = inside[0] if len(inside) > 1 else OWN
+        text = path.read_text(encoding="utf-8")
+        lines[room] += len(text.splitlines())
+        modules[room] += 1
+        classes[room] += sum(isinstance(node, ast.ClassDef) for node in ast.walk(ast.parse(text)))
+    return {room: (lines[room], modules[room], classes[room]) for room in lines}
+
+
+def test_no_room_is_larger_than_its_budget():
+    found = counted()
+    assert found.keys() == BUDGET.keys()
+    pairs = {room: (own, BUDGET[room]) for room, own in found.items()}
+    above = {room: each for room, each in pairs.items() if any(map(gt, *each))}
+    assert not above, "room: (lines, modules, classes) and what there may be"
+
+
+def test_functions_and_tests_keep_to_their_budgets():
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in PACKAGE.rglob("*.py")]
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef)
+    assert sum(isinstance(node, kinds) for tree in trees for node in ast.walk(tree)) <= FUNCTIONS
+    assert (
+        sum(len(path.read_text(encoding="utf-8").splitlines()) for path in TESTS.rglob("*.py")) <= TEST_LINES
+    )
