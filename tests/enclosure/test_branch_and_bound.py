@@ -15,10 +15,10 @@ from strategies import fractions
 from tubecert.bounds.feedback import tangents
 from tubecert.coordinates import Fields
 from tubecert.enclosure import branch_and_bound as bnb
-from tubecert.enclosure.branch_and_bound import Effort, decide, supremum
+from tubecert.enclosure.branch_and_bound import Effort, Search, decide, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
-from tubecert.enclosure.objective import Lipschitz, SumOfNorms
+from tubecert.enclosure.objective import Lipschitz, SumOfNorms, Target
 from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils, WeightedPencil, Weights, scalar
 from tubecert.expression import ZERO, Expression, constant, cos, norm, parse, sin, sqrt, substitute, symbol
 from tubecert.expression.matrix import identity
@@ -364,6 +364,18 @@ def test_a_badly_scaled_matrix_is_shown_positive_in_few_boxes():
         assert found.boxes < 60
 
 
+@pytest.mark.parametrize("name", ["cubic", "negative", "saddle", "ripple"])
+def test_boxes_that_stay_below_a_value_that_is_reached_say_no_more(name, monkeypatch):
+    """They are not bounded any closer, and what comes out is the same."""
+    objective, domain, _ = CASES[name]
+    own = supremum(objective, domain, Effort())
+    monkeypatch.setattr(Search, "_asked", property(lambda search: Target(search.target)))
+    closer = supremum(objective, domain, Effort())
+    assert own.below == closer.below
+    assert own.boxes == closer.boxes
+    assert own.above == pytest.approx(closer.above, rel=1e-13)
+
+
 # -- what makes a bound false is noticed ----------------------------------------------------------------------
 
 
@@ -428,6 +440,6 @@ def test_sanitised_bounds_reach_the_search():
     e = scalar(sqrt(x))
     minus, plus = np.array([[-1.0]]), np.array([[1.0]])
     with np.errstate(all="ignore"):
-        assert e.upper(minus, plus, -np.inf).upper[0] == np.inf
+        assert e.upper(minus, plus, Target(-np.inf)).upper[0] == np.inf
         assert e.lower(minus, minus)[0] == -np.inf
     assert Interval.exact(np.nan).sanitised().hi == np.inf

@@ -10,6 +10,7 @@ import pytest
 from tubecert.enclosure.branch_and_bound import Effort, decide
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.independence import Dependence
+from tubecert.enclosure.objective import Target
 from tubecert.expression import constant, cos, parse, sin, symbol
 from tubecert.expression.matrix import Matrix
 
@@ -89,7 +90,7 @@ def test_the_bound_holds_at_points_of_the_box() -> None:
     honest = np.linalg.pinv
     np.linalg.pinv = lambda a: seen.append(honest(a)) or seen[-1]  # type: ignore[assignment,func-returns-value]
     try:
-        bound = objective.upper(lo, hi, 1.0).upper
+        bound = objective.upper(lo, hi, Target(1.0)).upper
     finally:
         np.linalg.pinv = honest  # type: ignore[assignment]
     for share in rng.uniform(0, 1, (200, 40, 2)):

@@ -215,7 +215,7 @@ def test_expansions_contain_every_value_across_knots(sides, order):
     e = parse("y*x + y**2", symbols={v: symbol(v) for v in "xy"}).expression
     entry = e * tabled(own, symbol("x")) + symbol("y")
     expansion = MatrixFunction([((entry,),)]).expand(lo, hi)
-    whole = np.abs(expansion.rest[0]).sum(axis=0) + expansion.rad[0]
+    whole = expansion.over_vertices(expansion.filled(0))
     high, low = (expansion.mid[0] + whole).max(), (expansion.mid[0] - whole).min()
     X, Y = variable("x"), variable("y")
     field = Field([(Y * X + Y * Y) * looked_up(at_rechecks(own), X) + Y])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tubecert.bounds.feedback import ClosedFormGain, down_to_zero, tangents
+from tubecert.enclosure.objective import Target
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import constant, cos, sin, symbol
@@ -72,12 +73,12 @@ def test_finslers_lemma_is_proven_at_every_vertex(inputs):
         box = lo[k : k + 1], hi[k : k + 1]
         for share in (0.02, 0.3, 0.7, 0.98):
             target = float(least[k] + share * (most[k] - least[k]))
-            assert pencil.upper(*box, target).upper[0] > target
+            assert pencil.upper(*box, Target(target)).upper[0] > target
     centre = 0.5 * (lo + hi)
     for k in range(len(lo)):
         near = centre[k : k + 1] - 1e-4, centre[k : k + 1] + 1e-4
         target = float(projected_values(model, centre[k : k + 1])[0]) + 0.05
-        assert pencil.upper(*near, target).upper[0] == target
+        assert pencil.upper(*near, Target(target)).upper[0] == target
 
 
 def test_the_closed_form_holds_over_boxes():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -10,8 +11,8 @@ import numpy as np
 import pytest
 
 from tubecert.bounds.feedback import MU, exact_gain
+from tubecert.enclosure.objective import Target
 from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils, WeightedPencil, Weights
-from tubecert.enclosure.taylor import Expansion
 from tubecert.expression import ONE, ZERO, constant, symbol
 from tubecert.model import ControlAffineModel
 
@@ -49,7 +50,9 @@ def test_a_target_that_is_exceeded_by_less_than_a_rounding_is_not_said_to_hold()
     excess = sum(N[i][j] - tau * D[i][j] for i in range(n) for j in range(n))
     assert excess > 0
     assert all(Fraction(float(q)) == q for rows in (N, D) for row in rows for q in row)
-    found = Pencil(of_floats(N), of_floats(D)).upper(NOWHERE, NOWHERE, float(tau)).upper[0]
+    found = (
+        Pencil(of_floats(N), of_floats(D)).upper(NOWHERE, NOWHERE, Target(float(tau), float(tau))).upper[0]
+    )
     assert float(tau) < found < float(tau) * (1 + 1e-12)
 
 
@@ -58,7 +61,7 @@ def test_what_is_left_below_a_target_is_divided_by_the_largest_eigenvalue(target
     """D is as small as 1/2 in directions that have nothing to do with the value, which is 10/3 everywhere."""
     diagonals = (constant(Fraction(10, 3)), ZERO, ZERO), (ONE, 1 + x, 1 - x)
     N, D = (tuple(tuple(d[i] if i == j else ZERO for j in range(3)) for i in range(3)) for d in diagonals)
-    found = Pencil(N, D).upper(np.array([[-0.5]]), np.array([[0.5]]), target).upper[0]
+    found = Pencil(N, D).upper(np.array([[-0.5]]), np.array([[0.5]]), Target(target, target)).upper[0]
     assert Fraction(float(found)) >= Fraction(10, 3)
 
 
@@ -89,11 +92,16 @@ def test_badly_scaled_pencils_at_points():
         pencil, values = Pencil(of_floats(N), of_floats(D)), spectrum(N, (1, D))
         near = float(values[-1])
         for target in (np.inf, -np.inf, np.nan, near, near - 1e-3 * abs(near), near + 0.1 * abs(near), 0.0):
-            assert pencil.upper(NOWHERE, NOWHERE, target).upper[0] >= values[-1]
+            assert pencil.upper(NOWHERE, NOWHERE, Target(target)).upper[0] >= values[-1]
+            assert pencil.upper(NOWHERE, NOWHERE, Target(target, target)).upper[0] >= values[-1]
         assert pencil.lower(NOWHERE, NOWHERE)[0] <= values[-1]
         both = SumOfPencils([of_floats(N), of_floats(D)], of_floats(D))
         largest = max(abs(values[0]), abs(values[-1])) + 1
-        assert both.lower(NOWHERE, NOWHERE)[0] <= largest <= both.upper(NOWHERE, NOWHERE, np.inf).upper[0]
+        assert (
+            both.lower(NOWHERE, NOWHERE)[0]
+            <= largest
+            <= both.upper(NOWHERE, NOWHERE, Target(np.inf)).upper[0]
+        )
 
 
 def scaled_down(d, v):
@@ -142,11 +150,13 @@ def test_whatever_lapack_answers_no_bound_is_false(lie, factor, monkeypatch):
         for _ in range(5):
             D = definite(rng, 3, 1) - rng.choice([0.0, 0.3]) * np.eye(3)
             N = definite(rng, 3, 1) - np.eye(3)
-            for target in (np.inf, 0.0, -1.0, 1.0, 1e6):
+            for target in map(Target, (np.inf, 0.0, -1.0, 1.0, 1e6), (-np.inf, 0.0, -np.inf, 1.0, 1e6)):
                 answers.append(
                     (N, D, Pencil(of_floats(N), of_floats(D)).upper(NOWHERE, NOWHERE, target).upper[0])
                 )
-            answers.append((-D, np.eye(3), Definite(of_floats(D)).upper(NOWHERE, NOWHERE, -5e-324).upper[0]))
+            answers.append(
+                (-D, np.eye(3), Definite(of_floats(D)).upper(NOWHERE, NOWHERE, Target(-5e-324)).upper[0])
+            )
     for N, D, tau in answers:
         assert not np.isnan(tau)
         assert tau == np.inf or true_values(N - tau * D)[-1] <= 1e-9 * (1 + abs(tau))
@@ -165,7 +175,7 @@ def test_radii_of_a_box_count_with_their_weights_at_every_vertex():
 
             def blurred(lo, hi):
                 e = true(lo, hi)
-                return Expansion(e.mid, [e.rad[0] + self._r, e.rad[1] + self._s], e.rest, e.signs)
+                return replace(e, rad=[e.rad[0] + self._r, e.rad[1] + self._s])
 
             self._function.expand = blurred
             return super().upper(lo, hi, target)
@@ -178,7 +188,10 @@ def test_radii_of_a_box_count_with_their_weights_at_every_vertex():
     ):
         true = max((N + r) / d for d in (D - s, D + s))
         for target in (np.inf, true - 1e-9, true, 2 * true, -10.0, 10.0):
-            assert Known(Fraction(N), Fraction(D), r, s).upper(NOWHERE, NOWHERE, target).upper[0] >= true
+            assert (
+                Known(Fraction(N), Fraction(D), r, s).upper(NOWHERE, NOWHERE, Target(target, target)).upper[0]
+                >= true
+            )
 
 
 def test_the_value_of_a_box_is_that_of_its_worst_vertex():
@@ -187,14 +200,16 @@ def test_the_value_of_a_box_is_that_of_its_worst_vertex():
         for N, most in ((x, high), (-x, -low)):
             pencil = Pencil(((N, ZERO), (ZERO, constant(-5))), ((ONE, ZERO), (ZERO, ONE)))
             for target in (np.inf, most - 0.01, 0.5 * (low + high) if N is x else -0.5 * (low + high)):
-                assert pencil.upper(*box, target).upper[0] >= most
+                assert pencil.upper(*box, Target(target, target)).upper[0] >= most
 
 
 def test_a_ball_that_is_not_positive_bounds_nothing():
     pencil = Pencil(((ONE, ZERO), (ZERO, ONE)), ((x, ZERO), (ZERO, constant(2))))
     for low, high in ((-1.0, 1.0), (0.0, 1.0), (-2.0, -1.0)):
         for target in (np.inf, 1.0, 1e9):
-            assert pencil.upper(np.array([[low]]), np.array([[high]]), target).upper[0] == np.inf
+            assert (
+                pencil.upper(np.array([[low]]), np.array([[high]]), Target(target, target)).upper[0] == np.inf
+            )
 
 
 A = np.array([[-3.0, 1.0, 0.5], [0.25, -2.0, 1.0], [2.0, -1.0, 1.0]])
@@ -244,7 +259,7 @@ def test_the_feedback_gain_holds_over_ranges_of_mu(name):
         values = [float(spectrum(F, (1 / mu, B @ B.T), (mu, W))[-1]) for mu in inside]
         most = max(0.0, *values)
         for target in (np.inf, 0.99 * most, 1.01 * most, -1.0):
-            found = gain.upper(np.array([[low]]), np.array([[high]]), target).upper[0]
+            found = gain.upper(np.array([[low]]), np.array([[high]]), Target(target)).upper[0]
             assert found >= most * (1 - 1e-12)
             finite += low == 0 and bool(np.isfinite(found))
         for mu, value in zip(inside, values, strict=True):
@@ -268,5 +283,5 @@ def test_radii_count_with_the_weights_of_their_matrices(per_entry):
     for numerators, denominators, most in cases:
         pencil = WeightedPencil(numerators, denominators, weights)
         for target in (np.inf, 0.0, 0.9 * most, most - 1e-9, -1.0):
-            assert pencil.upper(*box, target).upper[0] >= most
-        assert pencil.upper(*box, 10 * most).upper[0] <= 10 * most
+            assert pencil.upper(*box, Target(target, target)).upper[0] >= most
+        assert pencil.upper(*box, Target(10 * most)).upper[0] <= 10 * most

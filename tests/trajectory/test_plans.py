@@ -17,7 +17,7 @@ from systems import SMALL
 from tubecert.certificate import seal
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.metric_norm import MetricNorm
-from tubecert.enclosure.objective import SumOfNorms
+from tubecert.enclosure.objective import SumOfNorms, Target
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.errors import SpecError
 from tubecert.expression import constant, cos, sin, symbol
@@ -334,7 +334,7 @@ def test_the_norm_in_a_metric_is_proven_from_both_sides():
     rng = np.random.default_rng(1)
     lo = rng.uniform(-1, 1, (50, 2))
     hi = lo + rng.uniform(0, 1.5, (50, 2))
-    upper = norm.upper(lo, hi, np.inf).upper
+    upper = norm.upper(lo, hi, Target(np.inf)).upper
     for _ in range(500):
         point = lo + rng.uniform(0, 1, lo.shape) * (hi - lo)
         a, b = point.T

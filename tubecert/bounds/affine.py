@@ -89,9 +89,9 @@ class NormOverRest:
         """The bound at the vertices of the affine part, plus the rest, theory 1a.6."""
         del target
         e = self._function.expand(lo, hi)
-        mid, rad, rest = e.mid[0], e.rad[0], e.rest[0]
+        mid, rad, rest = e.mid[0], e.over_vertices(e.rad[0]), e.rest[0]
         least, r = self._radius(lo, hi)
-        value = self._bound(mid, rad, r[:, None]) + norm_bound(rest.sum(axis=0))
+        value = self._bound(mid, rad, r[:, None]) + e.over_vertices(norm_bound(rest.sum(axis=0)))
         caused = norm_bound(rest.max(axis=2)) + self._lost(hi - lo, r - least)
         # a sum over at most 80 variables, and another one, of bounds: below 90 u <= 1e-14 (Higham 2002, eq. 3.5)
         return estimate_of(value * (1 + 1e-14), caused, e, lo, hi)

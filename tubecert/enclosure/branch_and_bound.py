@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
-from tubecert.enclosure.objective import Estimate, Objective
+from tubecert.enclosure.objective import Estimate, Objective, Target
 from tubecert.enclosure.processor import require_ieee
 from tubecert.enclosure.questions import (
     Bound,
@@ -130,6 +130,11 @@ class Search:
         gap = self.effort.gap if self.count > self.effort.cheap else 0.1 * self.effort.gap
         return self.below + max(gap * abs(self.below), self.effort.absolute)
 
+    @property
+    def _asked(self) -> Target:
+        """What bounds are to be: for a threshold, all that is below it is alike."""
+        return Target(self.target, self.below if self.threshold is None else self.target)
+
     def run(self) -> Steps[Supremum]:
         """The supremum.
 
@@ -227,7 +232,7 @@ class Search:
         if not len(lo):
             return lo, hi, bound
         yield from self._probe(0.5 * (lo + hi)[np.argsort(-bound, kind="stable")[:_PROBES]])
-        yield (above := Bound(lo[:, : self.own], hi[:, : self.own], self.target))
+        yield (above := Bound(lo[:, : self.own], hi[:, : self.own], self._asked))
         estimate = self._widened(above.answer, lo, hi)
         bound = np.minimum(bound, estimate.upper)
         yield from self._probe(estimate.corner[np.argsort(-bound, kind="stable")[:_PROBES]])

@@ -30,11 +30,12 @@ class Dependence:
         e = self._function.expand(lo, hi)
         R = _left_inverse(e.mid[0].mean(axis=1))[:, None]
         exact = np.zeros_like(R)
-        mid, rad = product((R, exact), (e.mid[0], e.rad[0]))
+        mid, rad = product((R, exact), (e.mid[0], e.over_vertices(e.rad[0])))
         departure = np.eye(R.shape[-2]) - mid
         rad = up(rad + 2.0**-52 * np.abs(departure))  # the subtraction is rounded once, by half of that
-        rest, slack = product((np.abs(R), exact), (e.rest[0].sum(axis=0), np.zeros_like(e.mid[0])))
-        value = up(spectral_norm_midrad(departure, rad).hi + norm_bound(up(rest + slack)))
+        rest, slack = product((np.abs(R), exact), (e.rest[0].sum(axis=0), np.zeros_like(e.rad[0])))
+        added = e.over_vertices(norm_bound(up(rest + slack)))
+        value = up(spectral_norm_midrad(departure, rad).hi + added)
         caused = norm_bound(np.abs(R[None]) @ e.rest[0]).max(axis=2)
         return estimate_of(value, caused, e, lo, hi)
 

@@ -2,8 +2,10 @@
 
 LAPACK only proposes a decomposition; its residual is then bounded from above with a-priori rounding bounds, so the
 results hold whatever LAPACK returned. Symmetric matrices: with S = V D V' + E and |V'V - I| <= delta < 1, Ostrowski's
-and Weyl's theorems give |lambda_k(S) - d_k| <= delta |d_k| + |E|; singular values likewise.
-Reference: S. M. Rump, Verification methods: rigorous results using floating-point arithmetic, Acta Numerica 2010.
+and Weyl's theorems give |lambda_k(S) - d_k| <= delta |d_k| + |E|; singular values likewise. Where only a sign is asked
+for, a Cholesky factorisation answers that is done here, operation by operation: nothing of LAPACK is in it.
+References: S. M. Rump, Verification methods: rigorous results using floating-point arithmetic, Acta Numerica 2010;
+Verification of positive definiteness, BIT 46, 2006.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ _TINY: Final = 1e-300  # covers underflow in products
 _LOST: Final = 1e-320  # covers underflow of a rounding error that is scaled afterwards
 _ROOT_TINY: Final = 1e-150  # covers underflow below a square root
 _STEP: Final = 16  # powers of two by which a congruence proposed in floats scales a row
+_LANES: Final = 4096  # matrices that are factorised at once: as many as a processor keeps at hand
 
 
 def finite(m: Array) -> NDArray[np.bool_]:
@@ -38,11 +41,20 @@ def _frobenius(m: Array) -> Array:
     return np.asarray(np.sqrt(np.sum(m * m, axis=(-2, -1))) * (1 + _gamma(k)) + _ROOT_TINY)
 
 
+def _lanes(m: Array) -> Array:
+    """Matrices (..., p, q) as (p, q, M), a copy: what is done entry by entry is done to all of them at once."""
+    p, q = m.shape[-2:]
+    return np.array(m.reshape(-1, p * q).T, order="C").reshape(p, q, -1)
+
+
 def norm_bound(m: Array) -> Array:
     """An upper bound of the spectral norm of any matrix between -m and m elementwise (m >= 0), shape (...,)."""
-    k = max(m.shape[-2:])
-    mixed = np.sqrt(m.sum(axis=-1).max(axis=-1) * m.sum(axis=-2).max(axis=-1)) * (1 + _gamma(k)) + _ROOT_TINY
-    return np.asarray(np.minimum(_frobenius(m), mixed))
+    p, q = m.shape[-2:]
+    lanes = _lanes(m)
+    rows, columns = lanes.sum(axis=1).max(axis=0), lanes.sum(axis=0).max(axis=0)
+    mixed = np.sqrt(rows * columns) * (1 + _gamma(max(p, q))) + _ROOT_TINY
+    whole = np.sqrt((lanes * lanes).sum(axis=(0, 1))) * (1 + _gamma(p * q)) + _ROOT_TINY  # as in `_frobenius`
+    return np.asarray(np.minimum(whole, mixed)).reshape(m.shape[:-2])
 
 
 def midrad(s: Interval) -> tuple[Array, Array]:
@@ -52,16 +64,22 @@ def midrad(s: Interval) -> tuple[Array, Array]:
 
 
 def congruence(t: Array, mid: Array, rad: Array) -> tuple[Array, Array]:
-    """Midpoint and radius of T S T' for all S in mid +- rad; shapes broadcast over leading axes.
+    """Midpoint and radius of T S T' for all S in mid +- rad; shapes broadcast over leading axes."""
+    return t @ mid @ np.swapaxes(t, -1, -2), congruence_radius(t, np.abs(mid), rad)
+
+
+def congruence_radius(t: Array, size: Array, rad: Array) -> Array:
+    """What T S T' is at most, entry by entry, off `t @ mid @ t'` for all S in mid +- rad, where |mid| <= size.
 
     Of a product of matrices with k columns each entry is off by gamma_k |A||B| (Higham 2002, eq. 3.13), here twice.
     """
     abs_t = np.abs(t)
-    tt, abs_tt = np.swapaxes(t, -1, -2), np.swapaxes(abs_t, -1, -2)
-    error = _gamma(2 * t.shape[-1]) * np.abs(mid) + rad * (1 + _gamma(2 * t.shape[-1]))
+    error = _gamma(2 * t.shape[-1]) * size + rad * (1 + _gamma(2 * t.shape[-1]))
     # a product that underflows in the first factor is multiplied by entries of the second: rows of T count
     lost = _TINY * (1 + abs_t.sum(axis=-1)[..., None, :])
-    return t @ mid @ tt, abs_t @ (error + _LOST) @ abs_tt * (1 + _gamma(2 * t.shape[-1])) + lost
+    return np.asarray(
+        abs_t @ (error + _LOST) @ np.swapaxes(abs_t, -1, -2) * (1 + _gamma(2 * t.shape[-1])) + lost
+    )
 
 
 def product(a: tuple[Array, Array], b: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -110,6 +128,44 @@ def eigenvalues_midrad(mid: Array, rad: Array) -> Interval:
     order = np.argsort(d, axis=-1)
     d, radius = np.take_along_axis(d, order, axis=-1), np.take_along_axis(radius, order, axis=-1)
     return Interval(np.nextafter(d - radius, -np.inf), np.nextafter(d + radius, np.inf)).sanitised()
+
+
+def exceeds(s: Array, least: Array) -> NDArray[np.bool_]:
+    """For which symmetric matrices (..., n, n) of floats, read below the diagonal, S > least I is proven; least >= 0.
+
+    With b_ii = s_ii - c, rounded, let the factorisation of B, S with this diagonal, come to its end with positive
+    pivots. In whatever order it is summed, its factor L has L L' = B + E with |E| <= g |L||L|', g = gamma_(n+1), entry
+    by entry (Higham 2002, theorem 10.3). In the spectral norm, |E| <= g |L|_F^2, and this square is the trace of L L',
+    at most tr B + g |L|_F^2: |E| <= g/(1 - g) tr B. No b_ii exceeds s_ii, and it is off by u of itself, so that
+    S > (c - (g/(1 - g) + u) tr S) I (Rump 2006). Here c is `least` + 4 (n + 3) u tr |S|: more than twice what is
+    needed, with the roundings of the trace and of c, which is below every s_ii. What underflows is off by 2^-1075 in
+    a product, by that times a root of tr S in a quotient: the first is below `_TINY`, the second below what is left
+    of the trace.
+
+    Every entry goes into a pivot: one that is NaN makes it NaN, which is not positive; so does an infinite trace, or
+    it makes it -inf, as an infinite entry beside the diagonal does. Each operation is one of numpy's, rounded by
+    itself; fused, or rounded twice, it is off by less than the two u for which there is room.
+    """
+    flat, above = s.reshape(-1, *s.shape[-2:]), np.broadcast_to(least, s.shape[:-2]).reshape(-1)
+    found = np.empty(len(flat), dtype=bool)
+    for start in range(0, len(flat), _LANES):
+        part = slice(start, start + _LANES)
+        with np.errstate(all="ignore"):  # a pivot that is not positive has no root
+            found[part] = _factorised(_lanes(flat[part]), above[part])
+    return found.reshape(s.shape[:-2])
+
+
+def _factorised(left: Array, least: Array) -> NDArray[np.bool_]:
+    """Whether all pivots of S - c I are positive, as `exceeds` says; `left` (n, n, M) is overwritten."""
+    n = len(left)
+    shift = least + (_gamma(n + 1) * np.sum([np.abs(left[i, i]) for i in range(n)], axis=0) + _TINY)
+    left[range(n), range(n)] -= shift
+    found = np.ones(len(shift), dtype=bool)
+    for j in range(n):
+        found &= left[j, j] > 0
+        column = left[j + 1 :, j] / np.sqrt(left[j, j])
+        left[j + 1 :, j + 1 :] -= column[:, None] * column
+    return found
 
 
 def spectral_norm_midrad(mid: Array, rad: Array) -> Interval:

@@ -34,7 +34,7 @@ class MetricNorm:
         e = self._function.expand(lo, hi)
         v, W = e.mid
         t = whitening(W.mean(axis=1))[:, None]
-        spread = [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
+        spread = [e.over_vertices(e.filled(k)) for k in range(2)]
         least = _least(t, W, spread[1])
         length = spectral_norm_midrad(*product((t, np.zeros_like(t)), (v, spread[0]))).hi
         value = (Interval.exact(length) / sqrt(Interval.exact(least))).hi
@@ -42,7 +42,11 @@ class MetricNorm:
         best = np.argmax(value, axis=1)
         signs = e.signs[best]
         corner = np.where(signs > 0, hi, np.where(signs < 0, lo, 0.5 * (lo + hi)))
-        caused = (norm_bound(np.abs(t) @ e.rest[0]) + length * norm_bound(e.rest[1])).max(axis=2).T
+        of_v, of_W = (
+            np.tile(norm_bound(rest), len(e.signs) // rest.shape[2])
+            for rest in (np.abs(t) @ e.rest[0], e.rest[1])
+        )
+        caused = (of_v + length * of_W).max(axis=2).T
         caused = np.where(np.isfinite(caused), caused, np.finfo(float).max)
         return Estimate(value.max(axis=1), corner, caused, caused)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,17 @@ from tubecert.enclosure.linalg import (
 )
 from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
 
-Target: TypeAlias = float | Array
-"""What a box need not be shown to stay below further: a number, or one for every box (N,), all finite or none."""
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What a search asks of its boxes: numbers, or arrays with one for every box (N,), all finite or none.
+
+    A box that is shown to stay at or below `enough` need not be looked at again; of one that stays at or below `floor`,
+    a value that the supremum is known to reach, it does not matter how far it stays below.
+    """
+
+    enough: float | Array
+    floor: float | Array = -np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +53,7 @@ class Objective(Protocol):
     variables: tuple[str, ...]
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
-        """Bounds from above over boxes; a box that can be shown to stay below `target` is given such a bound."""
+        """Bounds from above over boxes; one that can be shown to stay below what is enough is given such a bound."""
         ...
 
     def lower(self, lo: Array, hi: Array) -> Array:
@@ -71,8 +80,12 @@ class SumOfNorms:
         e = self._function.expand(lo, hi)
         value = np.zeros(e.mid[0].shape[:2])
         caused = np.zeros((lo.shape[1], len(lo)))
-        for mid, rad, rest in zip(e.mid, e.rad, e.rest, strict=True):
-            value = value + spectral_norm_midrad(mid, rad).hi + norm_bound(rest.sum(axis=0))
+        for k, (mid, rest) in enumerate(zip(e.mid, e.rest, strict=True)):
+            value = (
+                value
+                + spectral_norm_midrad(mid, np.zeros_like(mid)).hi
+                + e.over_vertices(norm_bound(e.filled(k)))
+            )
             caused += norm_bound(rest.max(axis=2))
         # additions only, of bounds: one for each variable in a rest and two for each matrix, below 90 u <= 1e-14
         return estimate_of(value * (1 + 1e-14), caused, e, lo, hi)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval
-from tubecert.enclosure.linalg import congruence, eigenvalues_midrad, finite, midrad, product, whitening
+from tubecert.enclosure.linalg import exceeds, finite, midrad, norm_bound, product, whitening
 from tubecert.enclosure.objective import Estimate, Target
 from tubecert.enclosure.taylor import Matrix, MatrixFunction
+from tubecert.enclosure.vertices import Balls, spectrum
 
 
 class ProjectedPencil:
@@ -30,19 +31,20 @@ class ProjectedPencil:
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """`target` where Finsler's condition is proven over the box, inf elsewhere."""
-        tau = float(target)
+        tau = float(target.enough)
         own = [self.variables.index(v) for v in self._function.variables]
         e = self._function.expand(lo[:, own], hi[:, own])
         centre = [mid.mean(axis=1) for mid in e.mid]
         t = whitening(centre[1])[:, None]
         s = _multiplier(centre, tau, self._inputs)[:, None, None, None]
-        filled = [rad + rest.sum(axis=0) for rad, rest in zip(e.rad, e.rest, strict=True)]
         mid = e.mid[0] - tau * e.mid[1] - s * e.mid[2]
-        size = np.abs(e.mid[0]) + abs(tau) * np.abs(e.mid[1]) + s * np.abs(e.mid[2])
+        size, rad = (of[0] + abs(tau) * of[1] + s * of[2] for of in (e.size, [e.filled(k) for k in range(3)]))
         # mid: two products, two differences, 4 u of `size` (itself short by 4 u); 1e-15 > 9 u. Radii as in `pencil`
-        rad = (filled[0] + abs(tau) * filled[1] + s * filled[2]) * (1 + 1e-14) + 1e-15 * size
-        excess = eigenvalues_midrad(*congruence(t, mid, rad)).hi[..., -1]
-        proven = (excess <= 0).all(axis=1) if np.isfinite(tau) else np.zeros(len(lo), dtype=bool)
+        rad = rad * (1 + 1e-14) + 1e-15 * size
+        scaled, off = Balls(mid, size * (1 + 1e-15), rad).within(t)
+        spread = e.over_vertices(norm_bound(off))
+        proven = exceeds(-scaled, spread).all(axis=1)
+        excess = spectrum(scaled)[..., -1] + spread
         worst = np.argmax(np.where(np.isnan(excess), -np.inf, excess), axis=1)
         signs = np.zeros(lo.shape)
         signs[:, own] = e.signs[worst]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
-from tubecert.enclosure.objective import Estimate, Objective
+from tubecert.enclosure.objective import Estimate, Objective, Target
 
 T = TypeVar("T")
 Cut: TypeAlias = tuple[Array, Array, NDArray[np.bool_]]
@@ -75,7 +75,7 @@ class Priorities(Question[Array]):
 class Bound(Question[Estimate]):
     """`Objective.upper` of boxes (N, d), in the variables of the objective."""
 
-    def __init__(self, lo: Array, hi: Array, target: float) -> None:
+    def __init__(self, lo: Array, hi: Array, target: Target) -> None:
         self.lo, self.hi, self.target = lo, hi, target
 
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import midrad
@@ -32,17 +33,34 @@ _LEAST_RADIUS = 1e-140  # a larger radius is a valid one, and the product of two
 
 @dataclass(frozen=True, slots=True)
 class Expansion:
-    """One batch of boxes: N boxes, V vertices, K matrices.
+    """One batch of boxes: N boxes, V vertices, K matrices; vertex v belongs to the end v mod A of the affine variables.
 
-    `mid[k]`, `rad[k]`: the affine part of matrix k at the vertices, shape (N, V, p_k, q_k);
-    `rest[k]`: bound of |R| elementwise, split by the variable that causes it, shape (d, N, V, p_k, q_k);
+    `mid[k]`: the affine part of matrix k at the vertices, shape (N, V, p_k, q_k);
+    `rad[k]`, `size[k]`: its radius at each of the A ends, and a bound of |mid[k]|, shape (N, A, p_k, q_k);
+    `rest[k]`: bound of |R| elementwise, split by the variable that causes it, shape (d, N, A, p_k, q_k);
     `signs`: shape (V, d), -1, 0 or 1 for each variable of the function (0: not expanded into vertices).
     """
 
     mid: list[Array]
     rad: list[Array]
+    size: list[Array]
     rest: list[Array]
     signs: Array
+
+    def of(self, boxes: NDArray[np.intp]) -> Expansion:
+        """Those of some boxes."""
+        mid, rad, size = ([a[boxes] for a in each] for each in (self.mid, self.rad, self.size))
+        return Expansion(mid, rad, size, [rest[:, boxes] for rest in self.rest], self.signs)
+
+    def filled(self, k: int) -> Array:
+        """The radius of matrix k with the rest of every variable in it, (N, A, p, q)."""
+        # a sum over at most 80 variables: 80 u < 90 u <= 1e-14
+        return np.asarray((self.rad[k] + self.rest[k].sum(axis=0)) * (1 + 1e-14))
+
+    def over_vertices(self, by_end: Array) -> Array:
+        """What is known at the ends, (N, A, ...), at the vertices, (N, V, ...)."""
+        repeats = len(self.signs) // by_end.shape[1]
+        return np.tile(by_end, (1, repeats, *(1 for _ in by_end.shape[2:])))
 
 
 class MatrixFunction:
@@ -140,7 +158,7 @@ class MatrixFunction:
         base = self._unpack(self._values.run(thin), self.shapes)
         here, second = self._derivatives(thin, box_lo, box_hi, len(curved))
         stacked_radius = np.tile(radius, (len(choices), 1))
-        mids, rads, rests = [], [], []
+        mids, rads, sizes, rests = [], [], [], []
         for k, value in enumerate(base):
             mid, rad = midrad(value)
             rest = np.zeros((dim, *mid.shape))
@@ -182,20 +200,19 @@ class MatrixFunction:
             parts = [np.abs(part) for part in (mid, *steps, *shifts, *(bend for _, _, bend in bends))]
             # k parts, each a product rounded at most twice, are added with at most k - 1 roundings: the error is below
             # (k + 1) u (1 + 2 k u) times the sum of their magnitudes (Higham 2002, eq. 4.4); 4e-16 > 3.6 u
-            slack = 4e-16 * (len(parts) + 2) * sum(parts[1:], start=parts[0])
-            mids.append(_fold(lifted, len(choices), count))
+            size = sum(parts[1:], start=parts[0])
+            slack = 4e-16 * (len(parts) + 2) * size
+            mids.append(_fold(lifted, len(choices)))
             # at most 8 variables are expanded: 8 additions, 4 roundings in each term, this sum and product, 14 u; 36 u
-            rads.append(
-                _fold(np.broadcast_to((rad + slack) * (1 + 4e-15), lifted.shape), len(choices), count)
-            )
+            rads.append(_fold(((rad + slack) * (1 + 4e-15))[None], len(choices)))
+            # a sum of at most 45 parts, here and at the vertices: 90 u < 2e-14
+            sizes.append(_fold((size * (1 + 2e-14))[None], len(choices)))
             # 5 roundings in each term and an addition for each of at most 80 variables: 86 u < 90 u <= 1e-14
-            full = np.broadcast_to((rest * (1 + 1e-14))[:, None], (dim, *lifted.shape))
-            folded = [_fold(part, len(choices), count) for part in full]
-            rests.append(np.stack(folded) if folded else np.zeros((0, *mids[-1].shape)))
+            rests.append(_fold((rest * (1 + 1e-14))[:, None], len(choices)))
         signs = np.zeros((len(flips) * len(choices), dim))
         for v, (flip, choice) in enumerate(product(flips, choices)):
             signs[v, expanded], signs[v, corners] = flip, choice
-        return Expansion(mids, rads, rests, signs)
+        return Expansion(mids, rads, sizes, rests, signs)
 
     def linear(self, lo: Array, hi: Array) -> list[tuple[Array, Array]]:
         """For each matrix its value at the centre and its change to the right end by variable, (1 + d, N, p, q), and a
@@ -250,13 +267,12 @@ class MatrixFunction:
         return here, second
 
     def _natural(self, lo: Array, hi: Array) -> Expansion:
-        mids, rads, rests = [], [], []
-        for value in self.at(lo, hi):
-            mid, rad = midrad(value)
-            mids.append(mid[:, None])
-            rads.append(rad[:, None])
-            rests.append(np.zeros((lo.shape[1], *mid[:, None].shape)))
-        return Expansion(mids, rads, rests, np.zeros((1, lo.shape[1])))
+        mids, rads = zip(
+            *((mid[:, None], rad[:, None]) for mid, rad in map(midrad, self.at(lo, hi))), strict=True
+        )
+        rests = [np.zeros((lo.shape[1], *mid.shape)) for mid in mids]
+        signs = np.zeros((1, lo.shape[1]))
+        return Expansion(list(mids), list(rads), [np.abs(mid) for mid in mids], rests, signs)
 
     @staticmethod
     def _unpack(values: Interval, shapes: Sequence[tuple[int, int]]) -> list[Interval]:
@@ -310,9 +326,9 @@ def _known(values: Interval) -> tuple[Array, Array]:
     return np.where(known, mid, 0.0), np.where(known, rad, np.inf)
 
 
-def _fold(values: Array, choices: int, count: int) -> Array:
-    """(F, A N, p, q) -> (N, F A, p, q)."""
-    flips = values.shape[0]
-    p, q = values.shape[-2:]
-    turned = values.reshape(flips, choices, count, p, q).transpose(2, 0, 1, 3, 4)
-    return np.ascontiguousarray(turned).reshape(count, flips * choices, p, q)
+def _fold(values: Array, choices: int) -> Array:
+    """(..., F, A N, p, q) -> (..., N, F A, p, q)."""
+    *more, flips, stacked, p, q = values.shape
+    count = stacked // choices
+    turned = np.moveaxis(values.reshape(*more, flips, choices, count, p, q), -3, len(more))
+    return np.ascontiguousarray(turned).reshape(*more, count, flips * choices, p, q)
