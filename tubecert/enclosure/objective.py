@@ -23,14 +23,14 @@ from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What a search asks of its boxes: numbers, or arrays with one for every box (N,), all finite or none.
+    """What a search asks of its boxes.
 
     A box that is shown to stay at or below `enough` need not be looked at again; of one that stays at or below `floor`,
     a value that the supremum is known to reach, it does not matter how far it stays below.
     """
 
-    enough: float | Array
-    floor: float | Array = -np.inf
+    enough: float
+    floor: float = -np.inf
 
 
 @dataclass(frozen=True, slots=True)

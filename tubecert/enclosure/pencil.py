@@ -57,10 +57,9 @@ class Pencil:
         e, weights = self._function.expand(lo[:, :own], hi[:, :own]), self._ends(lo, hi)
         balls = (_weighted(weights[part], e, part) for part in (slice(top), slice(top, None)))
         vertices = Vertices(self._frame(hi, e), *balls)
-        enough, floor = (np.broadcast_to(x, len(lo)) for x in (target.enough, target.floor))
-        if self._weights is not None:  # they answer for no other tau
-            floor = np.maximum(floor, 0.0)
-        low = vertices.below(floor)
+        # weights answer for no tau below 0
+        floor = target.floor if self._weights is None else max(target.floor, 0.0)
+        low = vertices.below(np.full(len(lo), floor))
         estimate = Estimate(
             np.where(low, floor, np.inf), 0.5 * (lo + hi), np.zeros(lo.shape), np.zeros(lo.shape)
         )
@@ -68,7 +67,7 @@ class Pencil:
         if len(left):
             ends = lo[left], hi[left]
             parts = vertices.of(left), e.of(left), [w[left] for w in weights]
-            closer = self._closer(ends, *parts, enough[left])
+            closer = self._closer(ends, *parts, target.enough)
             for column in ("upper", "corner", "caused", "spread"):
                 getattr(estimate, column)[left] = getattr(closer, column)
         return estimate
@@ -79,12 +78,12 @@ class Pencil:
         vertices: Vertices,
         e: Expansion,
         weights: Sequence[Array],
-        enough: Array,
+        enough: float,
     ) -> Estimate:
         """Bounds near the least ones, and how each variable takes part in them."""
         (lo, hi), own = box, len(self._own)
-        known = bool(np.all(np.isfinite(enough)))
-        excess, above = vertices.proposed(enough[:, None] if known else vertices.guess())
+        known = np.isfinite(enough)
+        excess, above = vertices.proposed(np.full((len(lo), 1), enough) if known else vertices.guess())
         wanted = above.max(axis=1)
         if known:
             wanted = np.where((excess <= 0).all(axis=1), np.fmin(enough, wanted), wanted)
@@ -94,7 +93,7 @@ class Pencil:
         # of the ends of the weights, the worst counts for the search
         shape = len(lo), -1, weights[0].shape[1], e.rad[0].shape[1]
         excess, above = (x.reshape(shape).max(axis=2).reshape(len(lo), -1) for x in (excess, above))
-        scale = np.abs(enough) if known else np.ones(len(lo))
+        scale = abs(enough) if known else 1.0
         estimate = estimate_of(
             above, self._caused(vertices.t, e, scale, weights), e, lo[:, :own], hi[:, :own]
         )
@@ -103,7 +102,7 @@ class Pencil:
         corner = np.where(e.signs[worst] == 0, 0.5 * (lo + hi)[:, :own], corner)
         loss = np.zeros((len(lo), 0))
         if self._weights is not None:
-            loss = scale[:, None] * self._weights.loss(lo[:, own:], hi[:, own:])
+            loss = scale * self._weights.loss(lo[:, own:], hi[:, own:])
         return Estimate(
             value,
             np.concatenate([corner, 0.5 * (lo + hi)[:, own:]], axis=1),
@@ -139,8 +138,8 @@ class Pencil:
         middle = [mid.mean(axis=1, keepdims=True) for mid in e.mid[self._top :]]
         return whitening(_mixed(weights, middle, 1).mean(axis=1))[:, None]
 
-    def _caused(self, t: Array, e: Expansion, scale: Array, weights: Sequence[Array]) -> Array:
-        """How much each variable's rest adds to the excess, (d, N); `scale` (N,): what the denominator counts."""
+    def _caused(self, t: Array, e: Expansion, scale: float, weights: Sequence[Array]) -> Array:
+        """How much each variable's rest adds to the excess, (d, N); `scale`: what the denominator counts."""
         caused = np.zeros((e.signs.shape[1], len(t)))
         for k, weight in enumerate(weights):
             own = 1.0 if k < self._top else scale
@@ -179,8 +178,7 @@ class FirstFinite:
         found = self._first.upper(lo, hi, target)
         missing = np.isinf(found.upper)
         if missing.any():
-            own = Target(*(np.broadcast_to(x, len(lo))[missing] for x in (target.enough, target.floor)))
-            other = self._second.upper(lo[missing][:, self._order], hi[missing][:, self._order], own)
+            other = self._second.upper(lo[missing][:, self._order], hi[missing][:, self._order], target)
             found.upper[missing] = other.upper
         return found
 

@@ -31,7 +31,7 @@ class ProjectedPencil:
 
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """`target` where Finsler's condition is proven over the box, inf elsewhere."""
-        tau = float(target.enough)
+        tau = target.enough
         own = [self.variables.index(v) for v in self._function.variables]
         e = self._function.expand(lo[:, own], hi[:, own])
         centre = [mid.mean(axis=1) for mid in e.mid]

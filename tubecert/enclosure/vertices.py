@@ -65,7 +65,7 @@ class Vertices:
         difference = tau[:, None, None, None] * self._bottom - self._top
         return np.asarray(exceeds(difference, self._spread(tau[:, None])).all(axis=1))
 
-    def proven(self, tau: Array, enough: Array | float = np.inf) -> Array:
+    def proven(self, tau: Array, enough: float = np.inf) -> Array:
         """A number for each box, (N,), for which that is proven: tau with room for roundings, or `enough` where tau is.
 
         From a number that fails the next one is proposed; inf where all do.
