@@ -27,6 +27,7 @@ from tubecert.claims.family import Reason
 from tubecert.claims.metric import MetricContraction, MetricDefinite, MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import constant, substitute
+from tubecert.metric import verify
 from tubecert.metric.verify import verify_metric
 from tubecert.model import ControlAffineModel
 from tubecert.verdict import Verdict
@@ -99,9 +100,27 @@ def test_the_five_digit_three_state_metric_is_certified():
     assert proof.verdict == "certified"
     assert proof.largest_rate.below <= 0.999998100 <= proof.largest_rate.above + 1e-6
     assert round(proof.largest_rate.above, 6) == 0.999998
-    assert proof.margin.below > 9.7e-5
+    assert 0 < proof.margin.below < 9.81e-5 < proof.margin.above + 1e-8
+    assert verify_metric(three_state(), BOX_THREE, EFFORT, closely=True).margin.below > 9.7e-5
     assert proof.lower_on_set.below <= 3.87523 <= proof.lower_on_set.above + 1e-4
     assert proof.upper_on_set.above == pytest.approx(5.8403, abs=1e-4)
+
+
+@pytest.mark.slow
+def test_where_c2_holds_with_room_a_hundredth_of_the_rate_is_enough(monkeypatch):
+    """Nothing that is claimed needs more digits, and each costs as much as all before it."""
+    asked, model = [], three_state(rate="1/2")
+    searched = verify.supremum
+
+    def noted(objective, domain, effort):
+        asked.append(effort.absolute)
+        return searched(objective, domain, effort)
+
+    monkeypatch.setattr(verify, "supremum", noted)
+    rate = verify_metric(model, BOX_THREE, EFFORT).largest_rate
+    assert asked[2:] == [0.005]  # after the bounds of M
+    assert 1e-4 < rate.above - rate.below <= 0.005
+    assert rate.below <= 0.999998 <= rate.above + 1e-6
 
 
 @pytest.mark.slow

@@ -30,7 +30,7 @@ from tubecert.model import TIME, ControlAffineModel
 from tubecert.verdict import Verdict
 
 Box = Sequence[tuple[Fraction, Fraction]]
-_FINEST = 1e-10  # relative to the rate
+_SHARP, _FINEST = 1e-2, 1e-10  # relative to the rate
 _HALF = 0.5
 _KEPT = 64  # proofs
 
@@ -60,8 +60,10 @@ class MetricProof:
         return own == other and self.safe_set == safe_set
 
 
-def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> MetricProof:
-    """Decide C1, C3 and C2, in this order, on the whole safe set."""
+def verify_metric(
+    model: ControlAffineModel, safe_set: Box, effort: Effort, *, closely: bool = False
+) -> MetricProof:
+    """Decide C1, C3 and C2, in this order, on the whole safe set; `closely`: the largest rate is asked for, too."""
     domain = _everywhere(model, safe_set)
     eye = identity(len(model.states))
 
@@ -95,7 +97,7 @@ def verify_metric(model: ControlAffineModel, safe_set: Box, effort: Effort) -> M
         return replace(proof, verdict=verdict, failed=claim, at=place(at))
     if len(model.inputs) == len(model.states):
         return proof  # as many inputs as states: C2 is void
-    found = _largest_rate(model, domain, effort)
+    found = _largest_rate(model, domain, effort, closely)
     below, above = -found.above / 2, -found.below / 2
     margin = Interval(below, above) - Interval.of(model.rate)
     proof = replace(
@@ -149,32 +151,34 @@ def _everywhere(model: ControlAffineModel, safe_set: Box) -> BoxDomain:
     return BoxDomain(states if model.time is None else {**states, TIME: model.time})
 
 
-def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort) -> Supremum:
-    """sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp), refined until the sign of the margin is known, and its size.
+def _largest_rate(model: ControlAffineModel, domain: BoxDomain, effort: Effort, closely: bool) -> Supremum:
+    """sup lmax(B_perp' F_0 B_perp, B_perp' W B_perp), refined until the sign of the margin is known.
 
-    Where that is costly, half of the margin is known well enough: metrics of least condition number nearly attain C2 in
-    many places, and each further digit would be paid for in all of them.
+    Where C2 holds nothing but that is used, and a hundredth of the rate is close enough: metrics of least condition
+    number nearly attain C2 in many places, and each further digit would be paid for in all of them. Where it fails, or
+    the rate is asked for `closely`, the margin is known to the gap, or to its half where that is costly.
     """
     objective = _rates(model, domain, effort)
     rate = float(model.rate)
     # a first look, to see how sharp the next must be
-    precision, budget = 1e-2, min(effort.cheap, effort.budget)
+    precision, budget = _SHARP, min(effort.cheap, effort.budget)
     while True:
         sharp = Effort(gap=0.0, absolute=precision * rate, budget=budget, progress=effort.progress)
         found = supremum(objective, domain, sharp)
         margin = -found.above / 2 - rate, -found.below / 2 - rate
-        settled = margin[0] > 0 or margin[1] < 0
-        dear = found.boxes >= effort.cheap
+        holds, fails, dear = margin[0] > 0, margin[1] < 0, found.boxes >= effort.cheap
         known = margin[1] - margin[0] <= (_HALF if dear else effort.gap) * max(map(abs, margin))
         exhausted = not found.reached and budget == effort.budget
-        if (settled and known) or precision <= _FINEST or exhausted:
+        enough = (holds or fails) and (known or (holds and found.reached and not closely))
+        if enough or precision <= _FINEST or exhausted:
             return found
-        if not dear:
+        if (holds or fails) and not dear:
             precision /= 100
-        elif budget < effort.budget:
-            budget, precision = effort.budget, min(precision, abs(margin[1]) / rate)
         else:
-            precision = min(precision / 10, abs(margin[1]) / rate)
+            if closely or not holds:  # the sign is known once the margin is known to its size
+                finer = precision / 10 if found.reached or budget == effort.budget else precision
+                precision = min(finer, abs(margin[1]) / rate)
+            budget = effort.budget
         precision = max(precision, _FINEST)
 
 

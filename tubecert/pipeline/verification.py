@@ -66,7 +66,7 @@ def verify(spec: Spec, effort: Effort, progress: Progress | None = None) -> Veri
         return replace(
             known, verdict=rank.verdict, reason=Reason(claim=RankOfB(), verdict=rank.verdict, at=at)
         )
-    proof = verify_metric(model, spec.safe_set, _told(effort, "C1-C3", progress))
+    proof = verify_metric(model, spec.safe_set, _told(effort, "C1-C3", progress), closely=True)
     if proof.lower_on_set is None or proof.upper_on_set is None:
         return replace(known, verdict=proof.verdict, reason=_reason(proof, proof.largest_rate))
     lower, upper = proof.lower_on_set, proof.upper_on_set
