@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from tubecert.bounds.feedback import MU, exact_gain
+from tubecert.enclosure.linalg import whitening
 from tubecert.enclosure.objective import Target
 from tubecert.enclosure.pencil import Definite, Pencil, SumOfPencils, WeightedPencil, Weights
+from tubecert.enclosure.vertices import Balls, Vertices
 from tubecert.expression import ONE, ZERO, constant, symbol
 from tubecert.model import ControlAffineModel
 
@@ -267,6 +269,20 @@ def test_the_feedback_gain_holds_over_ranges_of_mu(name):
             assert gain.lower(at, at)[0] <= max(0.0, value * (1 + np.sign(value) * 1e-12))
     assert finite >= 4 or m == n  # C2 is void then, and nothing bounds the gain towards mu = 0 at once
     assert gain.lower(np.array([[0.0]]), np.array([[0.0]]))[0] == 0.0
+
+
+@pytest.mark.parametrize("lost", [1e-14, 1e-6, 0.1, 3.0])
+def test_a_proposal_that_is_too_low_is_mended_and_one_that_is_too_high_is_kept(lost):
+    """Whatever is proposed first: what comes out is proven, and near the least number for which it can be."""
+    rng = np.random.default_rng(4)
+    D, N = definite(rng, 4, 2), definite(rng, 4, 3)
+    balls = [Balls(m[None, None], np.abs(m)[None, None], 0 * m[None, None]) for m in (N, D)]
+    vertices, most = Vertices(whitening(D[None])[:, None], *balls), spectrum(N, (1, D))[-1]
+    low, high = np.array([float(most) * (1 - lost)]), np.array([float(most) * (1 + lost)])
+    assert not vertices.below(low)[0]
+    assert most < vertices.proven(low)[0] < most * (1 + 1e-9)
+    assert most < vertices.proven(high)[0] <= high[0] * (1 + 1e-9)
+    assert vertices.proven(high, float(high[0]))[0] == high[0] or lost < 1e-12
 
 
 @pytest.mark.parametrize("per_entry", [False, True])
