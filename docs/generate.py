@@ -9,7 +9,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+from decimal import ROUND_CEILING, Context
 from pathlib import Path
 from typing import Any
 
@@ -255,51 +255,28 @@ def _sources(folder: Path, known: list[dict[str, Any]]) -> list[str]:
 
 
 def readme(text: str) -> str:
-    """The text of README.md with its table of published metrics: the page above, by source and rate."""
+    """The text of README.md with its table of published metrics: the page above, counted by source."""
     folder = ROOT / "configs" / "published"
     known = json.loads((folder / "verified.json").read_text(encoding="utf-8"))
-    found = json.loads((folder / "found" / "verified.json").read_text(encoding="utf-8"))
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    groups: dict[str, list[dict[str, Any]]] = {}
     for each in known:
-        notes = _notes(folder / Path(each["file"]).name)
-        series = "cached metric" in notes["source"]
-        source = re.sub(r", cached metric \d+| \(GitHub[^)]*\)", "", notes["source"])
-        claimed = f"rates near {each['rate']:.1f}" if series else notes["published"].split(";")[0]
-        groups.setdefault((source, claimed), []).append(each)
+        source = _notes(folder / Path(each["file"]).name)["source"]
+        groups.setdefault(re.split(r",| \(", source)[0], []).append(each)
     rows = [
-        "| source | published | proven | supports rates, 1/s | found there instead |",
-        "|---|---|---|---|---|",
-        *(_readme_row(folder, *key, groups[key], found) for key in sorted(groups)),
+        "| source | metrics | hold | refuted |",
+        "|---|---|---|---|",
+        *(_readme_row(source, groups[source]) for source in sorted(groups)),
     ]
     begin, end = (f"<!-- {word} of the table that docs/generate.py writes -->\n" for word in ("start", "end"))
     before, rest = text.split(begin)
     return before + begin + "\n" + "\n".join(rows) + "\n\n" + end + rest.split(end)[1]
 
 
-def _readme_row(
-    folder: Path, source: str, claimed: str, group: list[dict[str, Any]], found: list[dict[str, Any]]
-) -> str:
-    failed = [each for each in group if each["verdict"] != "certified"]
-    claims = dict.fromkeys(_FAILS[each["reason"]["claim"]] for each in failed)
-    holds, fails = f"{len(group) - len(failed)} hold", f"{len(failed)} refuted ({', '.join(claims)})"
-    if len(group) == 1:
-        holds, fails = "holds", f"refuted ({', '.join(claims)})"
-    below = Context(prec=4, rounding=ROUND_FLOOR)
-    rates = sorted(each["largest_rate"][0] for each in group if each.get("largest_rate"))
-    ends = (f"{below.create_decimal(str(r))}" if r > 0 else "none above 0" for r in (*rates[:1], *rates[-1:]))
-    supports = " to ".join(dict.fromkeys(ends))
-    beside = {
-        str(Context(prec=4, rounding=ROUND_CEILING).create_decimal(str(each["condition_number"][1])))
-        for each in found
-        for notes in [_notes(folder / "found" / Path(each["file"]).name)]
-        if "beside" not in notes and {Path(e["file"]).stem for e in failed} & set(notes["for"].split(", "))
-    }
-    instead = (
-        f"condition number {', '.join(sorted(beside))}" if beside else "none on its set" if failed else ""
-    )
-    proven = ", ".join(words for words, told in ((holds, len(failed) < len(group)), (fails, failed)) if told)
-    cells = [source, claimed, proven, supports, instead]
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+def _readme_row(source: str, group: list[dict[str, Any]]) -> str:
+    failed = [_FAILS[each["reason"]["claim"]] for each in group if each["verdict"] != "certified"]
+    counts = (f"{failed.count(claim)} {claim}" for claim in sorted(set(failed)))
+    told = f"{len(failed)} ({', '.join(counts)})" if failed else "0"
+    return f"| {source} | {len(group)} | {len(group) - len(failed)} | {told} |"
 
 
 def everything() -> dict[str, str]:
