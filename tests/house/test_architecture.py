@@ -51,7 +51,6 @@ ROOMS = [
     "stages",
     "words",
     "simulate",
-    "export",
     "pipeline",
     "checking",
     "sweep",

@@ -11,7 +11,6 @@ PACKAGE = Path(tubecert.__file__).parent
 ELSEWHERE = {  # where a format with significant digits stands, and what it makes that is no text for a reader
     "certificate/sections.py": "the points by which a plan is drawn",
     "expression/parse.py": "the range of a table, in a room below `digits`",
-    "export/": "the files of an export, which are compared byte by byte",
     "planner/propose.py": "decimals of a proposal",
     "recheck/": "words of its own, shared with nobody",
     "report/comparison.py": "signed differences in percent",

@@ -38,7 +38,7 @@ def tags_in(text):
         re.findall(r"\b(CCM_\d|26[abc]|(?:bounds|conditions):\w+|zeta_\d|omega_norm_ball|full_tube)", text)
     )
     found |= set(re.findall(r"\((\d\.\d+)\)", text))
-    found |= {f"theorem {name}" for name in re.findall(r"theorem ([ABC])\b", text)}
+    found |= {f"theorem {name}" for name in re.findall(r"theorem ([0AB])\b", text)}
     for first, last in re.findall(r"assumptions? (\d)(?: to (\d))?", text):
         found |= {f"assumption {i}" for i in range(int(first), int(last or first) + 1)}
     for part in re.findall(
@@ -47,8 +47,6 @@ def tags_in(text):
         found |= {
             f"theory {name}" for name in re.findall(r"(?<![\w.])\d[a-z]?\b", re.sub(r"\([^)]*\)", "", part))
         }
-    if "Closed form" in text:
-        found.add('section "Closed form"')
     return found | {name for name in ("F(x)",) if name in text}
 
 

@@ -41,5 +41,5 @@ def shortfalls():
 
 def test_what_a_condition_says_that_is_not_proven_is_written():
     found = {*shortfalls()}
-    assert len(found) > 5
+    assert len(found) > 3
     assert found - IN_ITS_OWN_WORDS <= {*SAYS}

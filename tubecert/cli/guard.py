@@ -95,7 +95,7 @@ def usage_hint(error: Exception, words: Sequence[str]) -> str:
     for word in words if len(option) == 2 else ():
         if word.startswith(option) and len(word) > 2 and word[1:].split("=")[0].replace("-", "").isalpha():
             return f"  {word} is read as single letters; options of several begin with two dashes: -{word}\n"
-    if words and words[0] in _GONE and "No such command" in str(getattr(error, "message", "")):
+    if words and words[0] in _GONE:
         return f"  {_GONE[words[0]]}\n"
     if option in _OTHER_OPTIONS:
         return f"  {_OTHER_OPTIONS[option]}\n"

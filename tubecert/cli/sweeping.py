@@ -17,7 +17,7 @@ _AFTER = """\b
 Examples:
   tubecert sweep plant.yaml --over tube.epsilon=.1:.6:6
   tubecert sweep plant.yaml --over tube.epsilon=.1:.6:6 --over metric.rate=.5:2:log5 --jobs 4
-  tubecert sweep plant.yaml --over conditions.decides=A,B,C --set tube.rho_a=0.2 -o study
+  tubecert sweep plant.yaml --over conditions.decides=0,A,B --set tube.rho_a=0.2 -o study
 
 \b
 A range is FIRST:LAST:COUNT (equal steps), FIRST:LAST:logCOUNT (equal factors), or VALUE,VALUE,...; several

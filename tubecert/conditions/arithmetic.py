@@ -157,7 +157,7 @@ def _near_one(x: Array, quotient: Interval) -> Interval:
 
 @quiet
 def decay_mean(y: T) -> T:
-    """(1 - e^(-y))/y, the mean of e^(-s) over [0, y]: decreasing, 1 at 0, as (4.0), (4.6) and (4.9) have it."""
+    """(1 - e^(-y))/y, the mean of e^(-s) over [0, y]: decreasing, 1 at 0, as (4.0) has it."""
     if isinstance(y, Interval):
         return Interval(_decay_mean_at(y.hi).lo, _decay_mean_at(y.lo).hi).sanitised()
     near = np.abs(y) < 1e-5

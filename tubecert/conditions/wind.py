@@ -33,7 +33,7 @@ def beside(n: Numbers[T]) -> T | None:
 
 
 def taken(n: Numbers[T]) -> T:
-    """What is taken for a part of h at least: eps_w |w| of (7.6)."""
+    """What is taken for a part of h at least: eps_w |w| of (7.9)."""
     return number(0, n.d0) if n.wind_error is None else n.wind_error
 
 

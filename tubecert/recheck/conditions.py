@@ -104,7 +104,7 @@ class Setting:
 
     @property
     def taken(self) -> Ball:
-        """|B^+ E| |w|: what an estimate takes for a part of h, (7.6), (7.9)."""
+        """|B^+ E| |w|: what an estimate takes for a part of h, (7.9)."""
         return arb(0) if self.wind is None else self.wind.explained * self.wind.bound
 
     @property

@@ -1,5 +1,5 @@
 """Search: `TubeProblem` -> proposals: the smallest gains, trade-off curves, recipes. The kernel decides about them.
 
 In: a problem and, possibly, gains asked for. Out: proposals, and what explains a result. Trusted: no, and it need not
-be. Implements: section "Closed form" of certificate A, "Search and proof" of B.
+be. Implements: what is proposed for theory sections 3 and 4.
 """
