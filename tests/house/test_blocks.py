@@ -1,4 +1,4 @@
-"""Every fenced block of README.md and docs/: commands run, specifications checked, code compiled, output compared.
+"""Every fenced block of README.md and docs/: commands run, specifications checked, code run, output compared.
 
 Pages that have a test of their own are named in ELSEWHERE, commands that take minutes, a cluster or the network in
 NOT_RUN: these are still read by the program's own command line. A block that is in no class fails.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
-import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,9 +22,6 @@ from typer.testing import CliRunner
 
 from tubecert import certificate
 from tubecert.cli.app import app
-from tubecert.library.certification import certification_of
-from tubecert.report import console
-from tubecert.report.terminal import Terminal
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -47,21 +43,14 @@ NOT_RUN = {
     "python3 -m venv": "needs the network; .ci/run does it",
     ".venv/bin/pip install": "needs the network; .ci/run does it",
     ".venv/bin/python -m pytest": "these tests",
-    "tubecert design": "minutes; tests/sweep runs designs of smaller systems",
-    "tubecert certify plant.yaml --set hardware.delay": "minutes, of the windows of a plant with a machine",
-    "tubecert synth configs/hardware_pvtol.yaml": "a metric of six states; the file has another one",
     "tubecert sweep": "30 certificates, or a cluster; tests/sweep runs smaller ones",
     "dask": "a cluster; tests/executor starts one",
-    "tubecert recheck hardware_orbit": "tests/export/test_export_belongs.py, with this certificate",
-    "tubecert simulate configs/hardware_orbit.yaml": "half a minute; tests/export/test_export_belongs.py, with 4 runs",
     "tubecert simulate configs/three_state.yaml": "half a minute; tests/simulate",
     "tubecert verify configs/published/": "minutes; tests/metric/test_published.py confirms what it found",
     "tubecert recheck plant.certificate.json --json": "the line above without it",
     "tubecert certify configs/pvtol.yaml": "half a minute; its README line is a test of tests/synthesis",
 }
 
-# what is not compared with a program, and why
-NOT_COMPARED = {" passed": "the whole suite"}
 FOREIGN = {
     ("docs/ci.md", "name: specifications"): "a workflow of GitHub; tests/cli/test_everyday.py runs its steps",
     ("docs/ci.md", "repos:"): "of pre-commit; tests/cli/test_everyday.py reads the hooks",
@@ -72,11 +61,10 @@ TWO_STATE = "tubecert simulate configs/two_state.yaml --epsilon 0.4"
 LESS = {
     TWO_STATE: "tubecert simulate configs/two_state.yaml --certificate two.json --runs 2",
 }
-ORBIT = "tubecert certify configs/hardware_orbit.yaml"  # a certificate that tests share
 OF_THE_RUNS = re.compile(r"^(not falsified|  l1 +(100 |0\.1715))")  # lines whose numbers all 100 runs decide
 
 
-def linear(states: str, inputs: str, *more: str, h: str = "0.01*sin(t)") -> str:
+def linear(states: str, inputs: str, *, h: str = "0.01*sin(t)") -> str:
     """A specification with a line for every key: an oscillator for each input."""
     names, moved = states.split(", "), inputs.split(", ")
     n = len(names)
@@ -94,20 +82,13 @@ def linear(states: str, inputs: str, *more: str, h: str = "0.01*sin(t)") -> str:
         f"metric: {{rate: 0.4, dual_metric: {W}}}",
         "tube: {epsilon: 0.3, rho_a: 0.1}",
     ]
-    return "\n".join([*lines, *more, ""])
+    return "\n".join([*lines, ""])
 
 
-MACHINE = ("hardware: {rate: 500}", "conditions: {decides: H}")
 PLANT = linear("p, v", "u")
 # what the parts of specifications on a page are parts of, where that is another one
 BASES = {
-    "docs/export.md": [linear("p, v", "u", *MACHINE)],
     "docs/families.md": [linear("p, v", "force")],
-    "docs/hardware.md": [
-        PLANT,
-        linear("p, v", "u", *MACHINE),
-        linear("p, v", "u", *MACHINE).replace("0], horizon", "0], input: [4.75785], horizon"),
-    ],
     "docs/language.md": [
         PLANT,
         linear("x, v", "u"),
@@ -227,17 +208,12 @@ class Reader:
             self.compares(block)
         elif block.kind == "python":
             exec(compile(block.text, str(block), "exec"), {})
-        elif block.kind == "c":
-            compiles(block)
         else:
             pytest.fail(f"{block}: a block of no kind that is tested: {block.kind!r}")
 
     def runs(self, command: str, *, fails: bool) -> None:
-        understood(command) if not command.startswith(("cc", "./")) else None
+        understood(command)
         self.said = ""
-        if command == ORBIT:
-            self.said = shown("hardware_orbit")
-            return
         if read_only(command) or (self.page != README and command in OF_THE_README):
             return
         self.prepare(command)
@@ -248,9 +224,6 @@ class Reader:
             result = CliRunner().invoke(app, paths, prog_name="tubecert")
             assert (result.exit_code != 0) == fails, (command, result.output)
             self.said = result.stdout + result.stderr
-        elif program and shutil.which("cc"):
-            done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
-            assert done.returncode == 0, done.stderr
 
     def files(self, argument: str) -> list[Path | str]:
         return [*sorted(Path().glob(argument))] if "*" in argument else [argument]
@@ -284,20 +257,9 @@ class Reader:
             assert "" in tried, f"{block}\n" + "\n".join(tried)
 
     def compares(self, block: Block) -> None:
-        if any(start in block.text for start in NOT_COMPARED):
-            return
         assert self.said, f"{block}: output of no command"
         missing = [line for line in block.text.splitlines() if not told(line, self.said.splitlines())]
         assert not missing, f"{block}: not printed: {missing}\n{self.said}"
-
-
-def shown(name: str) -> str:
-    """The report on the certificate of a shipped file, which is written as `certify` writes it."""
-    data = proven.shipped(name)
-    target = f"{name}.certificate.json"
-    Path(target).write_text(certificate.dump(data), "utf-8")
-    report = console.report(certification_of(data).certificate, target=target, verbose=False)
-    return Terminal.of(None, None, {}).text(report)
 
 
 def parts(text: str) -> list[tuple[str, str]]:
@@ -342,22 +304,6 @@ def completed(group: list[tuple[str, str]], base: list[tuple[str, str]]) -> Iter
     yield from (text for key, text in group if key not in dict(base))
 
 
-def compiles(block: Block) -> None:
-    """The lines in a function beside the exported header."""
-    if not shutil.which("cc"):
-        pytest.skip("no C compiler")
-    code = (
-        '#include "hardware_orbit.h"\n'
-        "void loop(hardware_orbit_real y[2], hardware_orbit_real u[1]);\n"
-        "void loop(hardware_orbit_real y[2], hardware_orbit_real u[1])\n"
-        "{ hardware_orbit_state state; int status;\n" + block.text + "(void)status; }\n"
-    )
-    Path("loop.c").write_text(code, "utf-8")
-    command = ["cc", "-std=c99", "-Wall", "-Werror", "-Wno-unused", "-c", "-Icontroller", "loop.c"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
 # the tests
 
 
@@ -391,8 +337,6 @@ def test_the_lists_name_what_is_there():
     ]
     for start in (*NOT_RUN, *LESS):
         assert any(command.startswith(start) for command in every), start
-    texts = [block.text for page in RUN for block in BLOCKS[page]]
-    assert all(any(start in text for text in texts) for start in NOT_COMPARED)
     assert {(block.page, block.text.split("\n")[0]) for page in RUN for block in BLOCKS[page]} >= set(FOREIGN)
     assert {page for page in ELSEWHERE if BLOCKS[page]} == set(ELSEWHERE)
     assert set(BASES) <= set(RUN)
