@@ -107,6 +107,10 @@ def test_numbered_equations_are_defined_once_and_exist():
         assert used <= set(defined), f"{page.name}: {sorted(used - set(defined))}"
 
 
+def test_the_readme_is_read_once():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 2000
+
+
 def test_errata_mentioned_elsewhere_exist():
     errata = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
     headings = " ".join(re.findall(r"^## (.*)$", errata, re.M))

@@ -62,10 +62,10 @@ def test_the_wheel_is_the_package_and_nothing_else(unpacked):
 @pytest.mark.slow
 def test_the_wheel_runs_without_the_checkout(unpacked, tmp_path):
     """README's first command, and what reads the data of the package: pages, schemas, templates."""
-    shutil.copy(ROOT / "configs" / "three_state.yaml", tmp_path)
+    shutil.copy(ROOT / "configs" / "two_state_orbit.yaml", tmp_path)
     lines = [
-        "certify three_state.yaml --rho-a 0.01",
-        "report three_state.certificate.json",
+        "certify two_state_orbit.yaml",
+        "report two_state_orbit.certificate.json",
         "init robot.yaml",
         "schema",
         "explain TC603",

@@ -135,7 +135,7 @@ _OTHER_OPTIONS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("--rho", "--rho_a", "--rhoa"), "the radius left to the adaptation is --rho-a"),
     **dict.fromkeys(("--eps",), "the radius beyond the initial offset is --epsilon"),
     **dict.fromkeys(("--out", "--json-out"), "the certificate's file is --output FILE, or -o FILE"),
-    "--formulas": "the paper's formulas as printed are gone: some are wrong (docs/errata.md); certify has the corrected ones",
+    "--formulas": "the paper's formulas as printed are in benchmarks/published.py; certify has the corrected ones",
     "--controller": "exported controllers are gone until the sampled loop has a certificate of its own",
     **dict.fromkeys(
         ("--control-rate", "--sample-time"), "the loop of certificate B acts in continuous time: leave it out"
