@@ -12,8 +12,8 @@ import tubecert
 # what is there now, outside the edge (`counts.EDGE`) and recheck; lower a number when it falls
 MOST = {
     "mappings of Any": 0,
-    "string-key reads": 85,
-    "Any": 185,
+    "string-key reads": 95,
+    "Any": 187,
     "asserts that something is not None": 15,
     "verdict literals": 16,
     "comparisons with sentences": 2,
