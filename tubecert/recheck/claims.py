@@ -29,6 +29,7 @@ from tubecert.recheck.kinds.kind import Ground, Kind, Section
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.result import INFIMA, Result
+from tubecert.recheck.specified.metric import Metric
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 
 
@@ -56,6 +57,7 @@ def _on_set(case: Case) -> Iterator[Claim]:
     s, budget, whole, shown = case.system, case.budget, case.whole, case.metric
     on_set = metric.on_set(s)
     yield Claim("f, B, W, h and the plan are smooth", (*case.over_tube,), lambda: _smooth(case))
+    yield Claim("rank(B) = m on the safe set", whole, lambda: metric.full_rank(s, budget))
     lower = None if shown.lower_on_set is None else shown.lower_on_set.below
     upper = None if shown.upper_on_set is None else shown.upper_on_set.above
     if lower is not None:
@@ -75,6 +77,7 @@ def _on_set(case: Case) -> Iterator[Claim]:
         (lower is None, upper is None),
         lambda: metric.stated(None not in (lower, upper), "there are none"),
     )
+    yield from _declared(case)
     yield Claim("C3: the Killing condition", whole, lambda: metric.killing(s))
     if len(s.inputs) < len(s.states):
         most = _rate_margin(case)
@@ -83,6 +86,22 @@ def _on_set(case: Case) -> Iterator[Claim]:
             (*whole, most),
             lambda: metric.contraction(s, most, budget) if most > 0 else metric.stated(False, "no margin"),
         )
+
+
+def _declared(case: Case) -> Iterator[Claim]:
+    """What the specification itself says of M on the safe set."""
+    s, own = case.system, case.result.specification.metric
+    assert isinstance(own, Metric)
+    for relation, bound, holds in (
+        (">=", own.lower, metric.lower_bound),
+        ("<=", own.upper, metric.upper_bound),
+    ):
+        if bound is not None:
+            yield Claim(
+                f"metric.bounds: M {relation} {float(bound):.6g} I on the safe set",
+                case.whole,
+                lambda bound=bound, holds=holds: holds(s, bound, metric.on_set(s), case.budget),  # type: ignore[misc]
+            )
 
 
 def _rate_margin(case: Case) -> Fraction:

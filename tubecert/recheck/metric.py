@@ -1,4 +1,4 @@
-"""Claims about the metric on the whole safe set: bounds of M, C2 with its margin, C3 exactly; and what f, B, W, h owe.
+"""Claims on the whole safe set: rank of B, bounds of M, C2 with its margin, C3 exactly; and what f, B, W, h owe.
 
 Implements: theory (1.1)-(1.3), 1.3 (i) for the null space of B'. M >= a I is I/a - W >= 0, M <= A I is A W - I >= 0.
 """
@@ -32,6 +32,7 @@ from tubecert.recheck.terms import (
 )
 
 _MINORS = 200
+_SHORT = 4  # columns up to which det B is written out
 _MOST_MINORS = 5_000  # of one determinant: those of 12 dense rows
 CONFIRMED = Outcome(verdict="confirmed")
 
@@ -63,6 +64,17 @@ def upper_bound(s: System, A: Fraction, domain: Domain, budget: int, unit: Rows 
     """0 < M <= A I; M <= A unit^-1 for another constant unit."""
     own = unit_matrix(len(s.states)) if unit is None else unit
     return prove(PositiveDefinite(plus(scaled(A, s.W), own, -1), s.W), domain, budget)
+
+
+def full_rank(s: System, budget: int) -> Outcome:
+    """rank(B) = m: no zero of det B where B is square, det(B'B) > 0 by B'B > 0 elsewhere."""
+    n, m, domain = len(s.states), len(s.inputs), on_set(s)
+    if m > n:
+        return stated(False, "there are more inputs than states")
+    if m == n <= _SHORT:
+        return _never_zero(determinant(s.B), domain, budget)
+    gram = times(turned(s.B), s.B)
+    return prove(PositiveDefinite(gram, unit_matrix(m)), domain, budget)
 
 
 def killing(s: System) -> Outcome:
@@ -163,8 +175,14 @@ def on_set(s: System) -> Boxed:
 
 
 def _never_zero(e: Term, domain: Domain, budget: int) -> Outcome:
+    """Contradicted where e is not above 0 at one point and not below it at another: between them it is 0."""
     positive = prove(NotNegative(e, strict=True), domain, budget)
-    return positive if positive.holds else prove(NotNegative(-e, strict=True), domain, budget)
+    if positive.holds:
+        return positive
+    negative = prove(NotNegative(-e, strict=True), domain, budget)
+    if positive.verdict == "undecided" and negative.verdict == "contradicted":
+        return positive
+    return negative
 
 
 def smooth(duties: Sequence[Owed], ranges: Mapping[str, Range], budget: int) -> Outcome:
