@@ -67,7 +67,7 @@ def test_a_key_that_is_set_gives_the_certificate_of_the_file_that_says_so(certif
 def test_it_rechecks_and_belongs_to_the_file_it_was_set_for(certified):
     done = run("recheck", certified / "set.json", "--spec", SPEC)
     assert done.exit_code == 0, done.output
-    words = "initial_state.at[0], metric.rate, tube.rho_a given on the command line"
+    words = "initial_state.at[0] = 0.009, metric.rate = .99, tube.rho_a = 1/100 given on the command line"
     assert words in " ".join(done.output.split())
     other = certified / "other.yaml"
     other.write_text(SPEC.read_text(encoding="utf-8").replace("- -x2", "- -2*x2"), encoding="utf-8")

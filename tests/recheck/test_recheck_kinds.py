@@ -300,7 +300,7 @@ def test_what_the_command_line_replaced_is_said(files):
     path, target = files(SMALL, epsilon=Fraction("0.3"))
     done = command(target, "--spec", path)
     assert done.exit_code == 0, done.stderr
-    assert "with epsilon given on the command line" in done.stdout
+    assert "with epsilon = 0.3 given on the command line" in done.stdout
 
 
 @pytest.mark.slow

@@ -1,14 +1,15 @@
 """Whether a certificate is of a specification: one judge for every command that is given both.
 
-Compared is what claims rest on: system, safe set, uncertainty, plan (from a CSV file: its knots), start, radii,
-adaptation, conditions, and the metric. A metric that was synthesised for the file is not in it: there the certificate
-must say that it was synthesised, and for what. What differs beside that is said, and makes no other system.
+Compared is every key of the canonical specification, and of a plan from a CSV file every knot: whatever differs makes
+another system (TC604), but for the keys in `_IDLE`, of which it is said. A metric that was synthesised for the file is
+not in it: there the certificate must say that it was synthesised, and for what. What the command line gave is no part
+of the file: every member of `overrides` is told with its value. So are other bytes of the files that say the same.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -17,7 +18,7 @@ from tubecert.certificate.result import KnotTexts, Overrides, Result
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.printable import visible
-from tubecert.records import from_json
+from tubecert.records import from_json, to_json
 from tubecert.spec import Setting, Spec, canonical
 from tubecert.spec.load import again
 from tubecert.spec.types import Table
@@ -34,14 +35,14 @@ class Belonging:
     """How a certificate and a specification compare.
 
     Claims rest on what is `serious`, none on what is `idle`; `overridden` was given on the command line that certified;
-    `synthesised` is a metric that the specification asks for; `same_text` says that the file is the one of then.
+    `synthesised` is a metric that the specification asks for; `rewritten` are files whose bytes are not those of then.
     """
 
     serious: tuple[str, ...]
     idle: tuple[str, ...]
     overridden: tuple[str, ...]
     synthesised: bool
-    same_text: bool
+    rewritten: tuple[str, ...]
 
     def require(self, spec: Spec, name: str) -> None:
         """Raises `ForeignError` (TC604) if the certificate is of another system."""
@@ -59,29 +60,47 @@ class Belonging:
             notes.append("the metric was synthesised for it")
         if self.idle:
             notes.append(f"nothing rests on what differs: {', '.join(self.idle)}")
-        elif not self.same_text:
-            notes.append("the text of the file has changed, the system has not")
+        notes += [f"the text of {visible(file)} has changed, the system has not" for file in self.rewritten]
         return f"belongs to {visible(path)}" + (f" ({'; '.join(notes)})" if notes else "")
 
 
 def compared(spec: Spec, result: Result) -> Belonging:
     """The `result` of a certificate against a specification; raises `SpecError` for keys set that it lacks."""
     own, effective = canonical(as_set(spec, result.overrides)), result.spec.effective.data
-    overridden = _overridden(own, effective, result.overrides)
+    _taken_over(own, effective, result.overrides)
     asked = own["metric"].get("synthesise") if "metric" in own else None
     if asked is not None and result.synthesis is not None and result.synthesis.asked.data == asked:
         own["metric"] = effective["metric"]
     differing = _differing(own, effective)
     if spec.trajectory.table is not None and "trajectory" not in differing:
         differing += _other_table(result.plan.knots, spec.trajectory.table)
-    digest = "sha256:" + hashlib.sha256(spec.source.encode()).hexdigest()
     return Belonging(
         serious=tuple(key for key in differing if key not in _IDLE),
         idle=tuple(key for key in differing if key in _IDLE),
-        overridden=(*overridden, *sorted(result.overrides.settings)),
+        overridden=tuple(_told(result.overrides)),
         synthesised=asked is not None,
-        same_text=digest == result.spec.file_hash,
+        rewritten=tuple(_rewritten(spec, result)),
     )
+
+
+def _told(overrides: Overrides) -> Iterator[str]:
+    """Everything that the command line gave, with its value: whether it did so is not to be known from the file."""
+    for key, value in to_json(overrides).items():
+        given = value if isinstance(value, dict) else {key: value}
+        yield from (f"{visible(name)} = {visible(str(own))}" for name, own in sorted(given.items()))
+
+
+def _rewritten(spec: Spec, result: Result) -> Iterator[str]:
+    """Files whose bytes are others than the certificate names, though they say the same."""
+    table = spec.trajectory.table
+    if _hash(hashlib.sha256(spec.source.encode()).hexdigest()) != result.spec.file_hash:
+        yield "the file"
+    if table is not None and _hash(table.sha256) != result.plan.file_hash:
+        yield table.file
+
+
+def _hash(digest: str) -> str:
+    return f"sha256:{digest}"
 
 
 def as_set(spec: Spec, overrides: Overrides) -> Spec:
@@ -89,17 +108,13 @@ def as_set(spec: Spec, overrides: Overrides) -> Spec:
     return again(spec, [Setting(path=path, text=text) for path, text in sorted(overrides.settings.items())])
 
 
-def _overridden(own: dict[str, Any], effective: Mapping[str, Any], overrides: Overrides) -> list[str]:
-    """What the command line replaced in the file; there the certificate's value is taken over into `own`."""
-    found = []
+def _taken_over(own: dict[str, Any], effective: Mapping[str, Any], overrides: Overrides) -> None:
+    """What the command line replaced in the file: there the certificate's value is taken over into `own`."""
     for key in ("epsilon", "rho_a"):
         if getattr(overrides, key) is not None:
-            found.append(key)
             own["tube"] = {**own["tube"], key: effective["tube"].get(key)}
     if overrides.metric is not None:
-        found.append("the metric")
         own["metric"] = effective["metric"]
-    return found
 
 
 def _differing(own: Mapping[str, Any], effective: Mapping[str, Any]) -> list[str]:
