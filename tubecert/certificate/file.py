@@ -1,7 +1,7 @@
 """The certificate as data: sealed with a hash, written atomically, read back, mapped to an exit code.
 
-In: the `result` of a certification. Out: canonical JSON. The hash is of the canonical bytes of `result` (UTF-8, sorted
-keys, no spaces, no NaN), so that any change of what was proven shows. Trusted: yes.
+In: what a certification found. Out: canonical JSON. The hash is of the canonical bytes of `result` (UTF-8, sorted
+keys, no spaces, no NaN), so that any change of what was proven shows; `notes` and `run` are not hashed. Trusted: yes.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, cast
 
+from tubecert.certificate.notes import split
 from tubecert.errors import TargetError
 from tubecert.files import STDIN, Kind, read, read_stdin, replace
 from tubecert.findings import Finding
@@ -41,9 +42,10 @@ def digest(data: Any) -> str:
     return "sha256:" + hashlib.sha256(canonical_bytes(data)).hexdigest()
 
 
-def seal(result: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
-    """The certificate: what was proven, its hash, and how it was made (versions, times, command line)."""
-    return {"format": FORMAT, "hash": digest(result), "result": dict(result), "run": dict(run)}
+def seal(found: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
+    """The certificate: what was proven, its hash, what explains it, how it was made (versions, times, command line)."""
+    result, notes = split(found)
+    return {"format": FORMAT, "hash": digest(result), "result": result, "notes": notes, "run": dict(run)}
 
 
 def dump(certificate: Mapping[str, Any]) -> str:

@@ -28,8 +28,8 @@ class ClearanceData:
     verdict: Verdict
     decides: bool
     clearance: Constant
-    t: float
     shape: ShapeData
+    t: float | None = None
     inside: tuple[float, float] | None = None
 
 

@@ -13,13 +13,14 @@ from typing import Any, Literal
 
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.follows import ClearanceData, InputData
+from tubecert.certificate.notes import joined
 from tubecert.certificate.searched import SynthesisData
 from tubecert.claims.family import Assumption, Reason
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.table import KINDS
-from tubecert.records import from_json, keyed, to_json
+from tubecert.records import FormError, from_json, keyed, to_json
 from tubecert.spec import Interpolation, Knots
 from tubecert.spec.types import PlanKind
 from tubecert.verdict import Verdict
@@ -191,9 +192,9 @@ class Bound:
 
     below: float | None
     above: float | None
-    symbol: str
-    equation: str
-    unit: str
+    symbol: str = ""
+    equation: str = ""
+    unit: str = ""
     at: Witness | None = None
 
 
@@ -214,7 +215,7 @@ class Recipes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What was proven: a pure function of the specification and the options.
+    """What was found: a pure function of the specification and the options; what of it claims nothing is in `notes`.
 
     What was not reached is None or empty. `sections` are those of the kinds, by their names; those in `decided_by`
     decide the verdict.
@@ -224,13 +225,13 @@ class Result:
     spec: Source
     claim: Claimed
     overrides: Overrides
-    effort: Work
     plan: PlanData
     safe_set: Mapping[str, tuple[Fraction, Fraction]]
     assumptions: tuple[Assumption, ...]
     declared: Mapping[str, float]
     reasons: tuple[Reason, ...]
     proof: Recipes
+    effort: Work | None = None
     synthesis: SynthesisData | None = None
     metric: MetricData | None = None
     tube: TubeData | None = None
@@ -277,12 +278,12 @@ class Result:
         return {key: pair for key, pair in found.items() if pair is not None}
 
     def to_json(self) -> Json:
-        """What `result` holds."""
+        """What `result` and `notes` hold, as one."""
         return to_json(self)
 
     @classmethod
     def from_json(cls, data: Json) -> Result:
-        """What `result` says; raises `FormError`."""
+        """What `result` says, with or without its notes; raises `FormError`."""
         return from_json(cls, data, "result")
 
 
@@ -298,7 +299,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
-    """A sealed result: `hash` is that of its canonical bytes."""
+    """A sealed result: `hash` is that of its canonical bytes, without its notes."""
 
     format: str
     hash: str
@@ -308,4 +309,7 @@ class Certificate:
     @classmethod
     def from_json(cls, data: Json) -> Certificate:
         """What a file says; raises `FormError`. The hash is not compared."""
-        return from_json(cls, data, "certificate")
+        if not isinstance(data, dict) or "notes" not in data:
+            raise FormError("certificate.notes", "is missing")
+        own = {key: value for key, value in data.items() if key != "notes"}
+        return from_json(cls, own | {"result": joined(data.get("result"), data["notes"])}, "certificate")

@@ -1,4 +1,4 @@
-"""How a metric was searched for, as a certificate tells it: nothing rests on it."""
+"""How a metric was searched for, as a certificate tells it: nothing rests on it but that it is what was asked for."""
 
 from __future__ import annotations
 
@@ -68,10 +68,9 @@ class SolverData:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SynthesisData:
-    """What was asked of a synthesis, what was tried, and why there is no metric where there is none."""
+class SearchData:
+    """What was tried by a synthesis, and why there is no metric where there is none."""
 
-    asked: Asked
     objective: str
     verdict: Verdict
     attempts: tuple[AttemptData, ...]
@@ -81,3 +80,11 @@ class SynthesisData:
     cut: Literal["deadline", "interrupted", "no_adaptation", "plan"] | None = None
     solver: SolverData | None = None
     reason: Reason | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisData:
+    """What was asked of a synthesis, and how it went."""
+
+    asked: Asked
+    search: SearchData | None = None

@@ -166,7 +166,7 @@ def _kept_metric(result: Result, target: str | None) -> str | None:
     from tubecert.verdict import Verdict
 
     metric, synthesis = result.metric, result.synthesis
-    solver = None if synthesis is None else synthesis.solver
+    solver = None if synthesis is None or synthesis.search is None else synthesis.search.solver
     if target is None or solver is None or metric is None or metric.verdict is not Verdict.CERTIFIED:
         return None
     certificate.write(target, metric_file(result.safe_set, metric, solver).to_json())

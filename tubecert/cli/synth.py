@@ -83,7 +83,7 @@ def run(given: Given, output: Output) -> ExitCode:
     if given.plot and found.rows:
         from tubecert.report.figures_rates import draw
 
-        certificate.write_text(given.plot, draw(found.data().table))
+        certificate.write_text(given.plot, draw(found.search().table))
     _report(found, system, target, output)
     if found.cut is not None and found.file is None:
         keeper.tell({"said": False})  # where it was is worth a word
@@ -110,7 +110,7 @@ def _tell(found: Synthesised, system: Spec, terminal: Terminal, output: Output) 
     from tubecert.report import synthesis
 
     if not output.quiet:
-        terminal.show(synthesis.verdict_line(found.data(), found.file, system.name))
+        terminal.show(synthesis.verdict_line(found.search(), found.file, system.name))
 
 
 def _wishes(given: Given, numbers: SynthesisNumbers) -> Wishes:
@@ -140,7 +140,7 @@ def _presented(
     from tubecert.records import to_json
     from tubecert.report import synthesis
 
-    data, file = found.data(), found.file
+    data, file = found.search(), found.file
     return (
         synthesis.verdict_line(data, file, system.name),
         lambda: synthesis.report(data, file, system, target),

@@ -50,11 +50,11 @@ class Missing:
     """A condition that is not proven, see `ConditionHolds`; `missing` is what is needed beyond the allowed."""
 
     condition: str
-    constant: str | None = None
     margin: Constant
-    allowed: float | None
-    needed: float | None
-    missing: float | None
+    constant: str | None = None
+    allowed: float | None = None
+    needed: float | None = None
+    missing: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -63,7 +63,7 @@ class DistanceData(SectionData):
     split: DistancePair | None
     least_adaptation: DistancePair | None
     asked: DistancePair | None
-    curve: tuple[GainPoint, ...]
+    curve: tuple[GainPoint, ...] = ()
     margins_around: DistanceAround | None = None
 
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:

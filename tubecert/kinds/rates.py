@@ -66,9 +66,9 @@ class RatesData(SectionData):
     projection_radius: Fraction | None
     margins: Mapping[str, Constant] | None
     least_adaptation: RatePair | None
-    curve: tuple[GainPoint, ...]
-    bandwidth_infimum: float | None
-    binds: str | None
+    curve: tuple[GainPoint, ...] = ()
+    bandwidth_infimum: float | None = None
+    binds: str | None = None
     margins_around: RatesAround | None = None
 
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:

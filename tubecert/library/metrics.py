@@ -114,7 +114,7 @@ class SynthesisedMetric(_Held):
     def __str__(self) -> str:
         from tubecert.report import synthesis
 
-        return synthesis.verdict_line(self.found.data(), self.file, self.given.name).plain
+        return synthesis.verdict_line(self.found.search(), self.file, self.given.name).plain
 
     def __repr__(self) -> str:
         return f"<SynthesisedMetric: {self}>"

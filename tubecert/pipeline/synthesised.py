@@ -11,7 +11,7 @@ from math import inf, log
 
 from tubecert.certificate.effective import Asked
 from tubecert.certificate.metric_file import MetricFile
-from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SynthesisData
+from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SearchData, SynthesisData
 from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Claim, Reason
 from tubecert.claims.tube import PlanBounded
@@ -125,9 +125,12 @@ class Synthesised:
     cut: Cut | None = None
 
     def data(self) -> SynthesisData:
-        """`result.synthesis` of a certificate: what was asked for, what was tried; no times."""
-        return SynthesisData(
-            asked=Asked(data=synthesis_data(self.wanted)),
+        """`result.synthesis` of a certificate, with its notes."""
+        return SynthesisData(asked=Asked(data=synthesis_data(self.wanted)), search=self.search())
+
+    def search(self) -> SearchData:
+        """What was tried; no times."""
+        return SearchData(
             objective=self.wanted.objective,
             verdict=self.verdict,
             attempts=tuple(map(_attempt, self.attempts)),

@@ -17,7 +17,8 @@ formula or rounding in the producer must not pass both.
 | `curve`, `tube` | the plan as segments that enclose it; boxes around it |
 | `document`, `spelling`, `reading` | JSON and expressions, read and checked for form |
 | `specification` with its parts in `specified`, `certificate` | closed types of all that a certificate may say |
-| `plans`, `enclosures`, `reasons`, `orientation` | their parts |
+| `plans`, `enclosures`, `reasons` | their parts |
+| `examines` | every key of a result, and the claim that examines it |
 | `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
 | `wind`, `unknown` | claims about a disturbance, and about parameters of which ranges are known |

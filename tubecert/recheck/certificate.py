@@ -1,8 +1,7 @@
 """The certificate, read into closed types: every object with the keys that it must have and may have, and no others.
 
 A key that is missing, unknown or of another kind is an error (TC603). Numbers are exact: the decimals that are written.
-Members that claim nothing are read all the same (`orientation`), so that nothing unknown can stand beside what is
-verified.
+What explains and claims nothing is in `notes`, which are not read.
 """
 
 from __future__ import annotations
@@ -16,12 +15,12 @@ from tubecert.recheck import unknown, wind
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.examines import not_examined
 from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.inputs import read_limited
 from tubecert.recheck.kinds.kind import VERDICTS
 from tubecert.recheck.kinds.table import KEYS, KINDS
 from tubecert.recheck.obstacles import read_cleared
-from tubecert.recheck.orientation import elasticities, run, synthesis
 from tubecert.recheck.plans import read_plan
 from tubecert.recheck.reasons import read_assumption, read_reason
 from tubecert.recheck.result import (
@@ -39,10 +38,13 @@ from tubecert.recheck.result import (
 )
 from tubecert.recheck.specification import Specification, read_specification
 from tubecert.recheck.specified.loop import DECIDES
-from tubecert.recheck.specified.metric import Wanted
+from tubecert.recheck.specified.metric import Wanted, read_wanted
 from tubecert.recheck.specified.numbers import Range, Rows
 from tubecert.recheck.specified.plant import Plant
 from tubecert.recheck.specified.start import read_start
+
+NOT_HASHED = ("notes", "run")
+"""Members of a certificate beside its result: what they say is not examined."""
 
 _PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*|\[\d{1,6}\])*", re.ASCII)
 _PART = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]", re.ASCII)
@@ -50,9 +52,12 @@ _PART = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]", re.ASCII)
 
 def read_certificate(document: Node) -> Certificate:
     """The certificate in a document; raises `CertificateError` for whatever is not of its form."""
-    own = document.closed("format", "hash", "result", "run")
-    run(own["run"])
-    return Certificate(read_result(own["result"]), own["hash"].text(), digest(own["result"].value))
+    own = document.closed("format", "hash", "result", "notes", "run")
+    for key in NOT_HASHED:
+        own[key].mapping()
+    result = read_result(own["result"])
+    unread = (*NOT_HASHED, *not_examined(own["result"]))
+    return Certificate(result, own["hash"].text(), digest(own["result"].value), unread)
 
 
 def read_result(node: Node) -> Result:
@@ -62,7 +67,6 @@ def read_result(node: Node) -> Result:
         "spec",
         "claim",
         "overrides",
-        "effort",
         "plan",
         "safe_set",
         "assumptions",
@@ -78,19 +82,14 @@ def read_result(node: Node) -> Result:
             "tube",
             *KEYS,
             "decided_by",
-            "elasticities",
         ),
     )
     verdict = own["verdict"].word(*VERDICTS)
     spec = own["spec"].closed("effective", "effective_hash", "file_hash")
     spec["file_hash"].text()
-    effort = own["effort"].closed("gap", "budget", optional=("gaps",))
-    effort["gap"].decimal()
-    effort.get("gaps", lambda node: [gap.decimal() for _, gap in node.items()])
-    effort["budget"].count()
     specification = read_specification(spec["effective"])
     states = specification.plant.states
-    last = ("constants", "tube", *KEYS, "decided_by", "elasticities")
+    last = ("constants", "tube", *KEYS, "decided_by")
     searched = any(key in own for key in last[2:])
     if verdict == "certified" or searched:  # the search comes last: everything else must be there
         own.require("metric", *last)
@@ -107,7 +106,7 @@ def read_result(node: Node) -> Result:
         declared=_declared(own["declared"]),
         reasons=tuple(read_reason(item, len(states)) for item in own["reasons"].entries()),
         recipes=_recipes(own["proof"], sections),
-        synthesised=own.get("synthesis", lambda item: synthesis(item, len(states))),
+        synthesised=own.get("synthesis", lambda item: read_wanted(item.closed("asked")["asked"])),
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, specification.plant)),
         clearance=own.get("clearance", lambda item: tuple(map(read_cleared, item.entries()))) or (),
@@ -288,20 +287,11 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
     if spec.plant.ranges:
         names += unknown.CONSTANTS
     own = node.closed(*names)
-    n = len(result["safe_set"].mapping())
-    return {name: _constant(own[name], n) for name in names}
+    return {name: _constant(own[name]) for name in names}
 
 
-def _constant(node: Node, n: int) -> Enclosure:
-    labels = ("symbol", "equation", "unit")
-    own = node.closed("below", "above", *labels, optional=("at",))
-    for key in labels:
-        own[key].text()
-    if "at" in own:
-        point = own["at"].closed("x", optional=("t",))
-        if len(point["x"].numbers()) not in (0, n):
-            raise point["x"].refused(f"must have {n} entries")
-        point.get("t", Node.number)
+def _constant(node: Node) -> Enclosure:
+    own = node.closed("below", "above")
     return Enclosure(own.known("below", Node.number), own.known("above", Node.number))
 
 
@@ -309,7 +299,6 @@ def _constant(node: Node, n: int) -> Enclosure:
 
 
 def _sections(own: Members) -> Sections:
-    elasticities(own["elasticities"], [kind.key for kind in KINDS if kind.elastic], MEASURED)
     read = {kind.key: kind.read(own[kind.key]) for kind in KINDS}
     return Sections(read, own["decided_by"].texts())
 

@@ -136,11 +136,6 @@ def _tube(case: Case) -> Iterator[Claim]:
             SHARP,
         )
     yield Claim(
-        "what is drawn of the plan lies on it",
-        (*case.whole, case.knots, plan.samples),
-        lambda: planned.drawn(case.curve, plan),
-    )
-    yield Claim(
         f"rho = {float(place.rho):.6g} is large enough",
         (*case.over_tube, lower, upper, case.tube.epsilon, case.tube.rho_a),
         lambda: _radius(case),
@@ -256,13 +251,7 @@ def _beside(case: Case) -> Iterator[Claim]:
 
 def _gains(case: Case) -> Iterator[Claim]:
     sections, recipes = case.sections, case.result.recipes
-    radii = [r for kind in KINDS for r in kind.projection_radii(sections.by_key[kind.key])]
-    ground = Ground(
-        setting=case.setting,
-        constants=case.constants,
-        depends=case.numbers,
-        projection_radius=radii[0] if radii else Fraction(0),
-    )
+    ground = Ground(setting=case.setting, constants=case.constants, depends=case.numbers)
     for kind in KINDS:
         section, own = sections.by_key[kind.key], ground
         missing = kind.uncovered(case.setting)

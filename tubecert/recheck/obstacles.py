@@ -75,9 +75,7 @@ def _point(node: Node) -> Point:
 
 def read_cleared(node: Node) -> Cleared:
     """One of `result.clearance`."""
-    own = node.closed("verdict", "decides", "clearance", "t", "shape", optional=("inside",))
-    own["t"].number()
-    own.get("inside", lambda item: [value.number() for value in item.pair()])
+    own = node.closed("verdict", "decides", "clearance", "shape")
     shape = own["shape"].closed("diagonal", "beside")
     diagonal, beside = (
         (first.number(), second.number())

@@ -1,4 +1,4 @@
-"""A plan through knots: that it is the plan its task asks for, and that what is drawn of a plan lies on it.
+"""A plan through knots: that it is the plan its task asks for.
 
 A plan *is* what its knots define: u* between the inputs at knots (held, or linear), x* the cubic pieces whose slopes at
 their ends are f(x*) + B(x*) u*. Nothing is believed of how the knots were found: that the inputs lead along the states
@@ -8,18 +8,15 @@ only what the task promises is left to examine: start, horizon, and with a goal 
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from fractions import Fraction
 
 from tubecert.recheck.balls import Ball, exact, length
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.curve import Curve
 from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.plans import Plan
 from tubecert.recheck.specified.trajectory import Planned
 
 _MISS = Fraction(1, 1000)  # of 1 + |target|: how far from its target a planned curve may end
-_DRAWN = Fraction(1, 10**5)  # of 1 + |x|: how far from the plan what is drawn of it may lie
 
 
 def serves(task: Planned, plan: Plan) -> Outcome:
@@ -39,21 +36,3 @@ def serves(task: Planned, plan: Plan) -> Outcome:
 
 def _distance(a: tuple[Fraction, ...], b: tuple[Fraction, ...]) -> Ball:
     return length([exact(x - y) for x, y in zip(a, b, strict=True)])
-
-
-def drawn(curve: Curve, plan: Plan) -> Outcome:
-    """The points that are there to draw the plan lie on it."""
-    if plan.samples is None:
-        return CONFIRMED
-    begins = [float(part.start.mid()) for part in curve.parts]
-    for t, x in zip(*plan.samples, strict=True):
-        if t < 0 or (curve.horizon is not None and t > curve.horizon):
-            return stated(False, f"a sample at t = {float(t):.6g} is outside of the horizon")
-        part = curve.parts[max(0, bisect_right(begins, float(t)) - 1)]
-        field = curve.field.with_values(part.values)
-        own = field.at([exact(t) - part.start] if field.variables else [])[: len(x)]
-        size = length([exact(value) for value in x])
-        missed = length([exact(value) - y for value, y in zip(x, own, strict=True)])
-        if not missed <= exact(_DRAWN) * (1 + size):
-            return stated(False, f"a sample at t = {float(t):.6g} is not on the plan")
-    return CONFIRMED

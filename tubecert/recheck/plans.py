@@ -1,4 +1,4 @@
-"""The plan as a certificate holds it: its kind, its knots, points to draw it by."""
+"""The plan as a certificate holds it: its kind, its knots."""
 
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ class Plan:
     interpolation: str | None
     curve: str | None
     knots: Knots | None
-    samples: tuple[Numbers, Rows] | None
     file: str | None
     file_hash: str | None
 
@@ -35,9 +34,7 @@ class Plan:
 def read_plan(node: Node, specification: Specification) -> Plan:
     """`result.plan`; the members that it has depend on the kind of trajectory."""
     n, m = len(specification.plant.states), len(specification.plant.inputs)
-    optional = (
-        ["interpolation"] if isinstance(specification.trajectory, AnyPlan) else ["interpolation", "samples"]
-    )
+    optional = ["interpolation"]
     if not isinstance(specification.trajectory, (Resting, Expressed, AnyPlan)):
         optional += ["curve", "knots"]
     if isinstance(specification.trajectory, Tabled):
@@ -45,7 +42,7 @@ def read_plan(node: Node, specification: Specification) -> Plan:
     own = node.closed("kind", optional=optional)
     knots = own.get("knots", lambda item: _knots(item, n, m))
     if "interpolation" in own:
-        own.require(*(key for key in optional if key != "samples"))
+        own.require(*optional)
     return Plan(
         kind=own["kind"].text(),
         interpolation=own.get(
@@ -53,7 +50,6 @@ def read_plan(node: Node, specification: Specification) -> Plan:
         ),
         curve=own.get("curve", Node.text),
         knots=knots,
-        samples=own.get("samples", lambda item: _samples(item, n)),
         file=own.get("file", Node.text),
         file_hash=own.get("file_hash", Node.text),
     )
@@ -67,10 +63,3 @@ def _knots(node: Node, n: int, m: int) -> Knots:
         for key, size in (("x", n), ("u", m))
     )
     return Knots(t, x, u)
-
-
-def _samples(node: Node, n: int) -> tuple[Numbers, Rows]:
-    """Times and points of the plan."""
-    own = node.closed("t", "x")
-    t = own["t"].numbers()
-    return t, tuple(tuple(e.number() for e in row) for row in own["x"].rows(len(t), n))

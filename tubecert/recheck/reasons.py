@@ -1,7 +1,6 @@
-"""Reasons, assumptions and advice of a certificate: ids with parameters, each id with the parameters that it has.
+"""Reasons and assumptions of a certificate: ids with parameters, each id with the parameters that it has.
 
-What a reason says of gains is a statement and is compared; advice (`relax`), failures and outcomes of a synthesis are
-for orientation, and known all the same.
+What a reason says of gains is a statement and is compared; failures of a synthesis are known by their form.
 """
 
 from __future__ import annotations
@@ -23,16 +22,12 @@ Parameters = dict[str, object]
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """A claim by its id and parameters, its verdict, and the point that shows it: (time, if there is one; state).
-
-    `advice`: the ids of what is advised, of which no more is examined.
-    """
+    """A claim by its id and parameters, its verdict, and the point that shows it: (time, if there is one; state)."""
 
     claim: str
     parameters: Parameters
     verdict: str
     at: tuple[Fraction | None, Numbers] | None
-    advice: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +63,8 @@ def _read(
 
 def read_reason(node: Node, n: int) -> Reason:
     """One of `result.reasons`."""
-    claim, parameters, own = _read(node, "claim", _CLAIMS, ("verdict", "at", "relax"))
-    return Reason(
-        claim,
-        parameters,
-        own["verdict"].word(*VERDICTS),
-        own.get("at", lambda at: _at(at, n)),
-        own.get("relax", _advice) or (),
-    )
+    claim, parameters, own = _read(node, "claim", _CLAIMS, ("verdict", "at"))
+    return Reason(claim, parameters, own["verdict"].word(*VERDICTS), own.get("at", lambda at: _at(at, n)))
 
 
 def read_assumption(node: Node) -> Assumption:
@@ -98,10 +87,6 @@ def _at(node: Node, n: int) -> tuple[Fraction | None, Numbers]:
 
 def _claim(node: Node) -> str:
     return _read(node, "claim", _CLAIMS)[0]
-
-
-def _advice(node: Node) -> tuple[str, ...]:
-    return tuple(_read(item, "id", _RELAX)[0] for item in node.entries())
 
 
 def _texts(node: Node) -> object:
@@ -141,7 +126,7 @@ _CLAIMS: Mapping[str, Form] = {
     ),
     "gains_suffice": (
         {"section": Node.text, "margins": _margins},
-        {"binds": Node.text, "predictor_gain": Node.decimal},
+        {"predictor_gain": Node.decimal},
     ),
     "condition_holds": (
         {"section": Node.text, "condition": Node.text},
@@ -197,43 +182,6 @@ _OUTCOMES: Mapping[str, Form] = {
     "wrong_shape": ({"route": Node.text}, {}),
     "not_proven": ({"route": Node.text, "condition": _claim, "verdict": _word(*VERDICTS)}, {}),
     "condition_unbounded": ({"route": Node.text}, {}),
-}
-
-_REMEDIES: Mapping[str, Form] = {
-    "correct_plan": _NONE,
-    "other_interpolation": ({"interpolation": _word("hold", "linear"), "defect": Node.number}, {}),
-    "more_knots": _NONE,
-}
-
-_RELAX: Mapping[str, Form] = {
-    "halve_constant": ({"constant": Node.text, "factor": Node.number}, {}),
-    "mend_plan": (
-        {
-            "defect": Node.number,
-            "share": Node.number,
-            "remedy": lambda node: _read(node, "id", _REMEDIES)[0],
-        },
-        {"t": Node.number},
-    ),
-    "raise_budget": ({}, {"proof": Node.flag}),
-    "shrink_tube": _NONE,
-    "reduce_radii": _NONE,
-    "leave_plan_room": _NONE,
-    "reduce_initial_error": _NONE,
-    "enlarge_safe_set": _NONE,
-    "shrink_safe_set": ({}, {"factor": Node.number, "rate": Node.decimal}),
-    "lower_rate": ({}, {"to": Node.number}),
-    "other_metric": _NONE,
-    "declare_metric_bound": ({}, {"side": _SIDE, "value": Node.number}),
-    "declare_uncertainty_bound": ({"constant": Node.text, "value": maybe}, {}),
-    "ask_for_rate_below": ({"rate": Node.decimal}, {}),
-    "ask_for_rate_up_to": ({"rate": Node.decimal}, {}),
-    "give_input": _NONE,
-    "other_variables": _NONE,
-    "lower_degree": _NONE,
-    "constant_inputs": _NONE,
-    "higher_degree": ({"degree": Node.count}, {}),
-    "raise_condition_number": ({"to": Node.number}, {}),
 }
 
 _ASSUMPTIONS: Mapping[str, Form] = {

@@ -166,8 +166,9 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """A certificate: its result, the hash that it states, and the hash that the result has."""
+    """A certificate: its result, the hash that it states, and the hash that the result has; what no claim examines."""
 
     result: Result
     stated_hash: str
     hash: str
+    unread: tuple[str, ...]

@@ -16,7 +16,6 @@ from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import read
 from tubecert.recheck.examination import Claim, Memory
 from tubecert.recheck.metric import stated
-from tubecert.recheck.orientation import NOT_EXAMINED
 from tubecert.recheck.result import Certificate
 
 BUDGET = 200_000
@@ -105,7 +104,7 @@ def recheck(
         stated=certificate.result.verdict,
         hash=certificate.stated_hash,
         claims=tuple(found),
-        unread=(*NOT_EXAMINED, *_refuted_beside(certificate)),
+        unread=(*certificate.unread, *_refuted_beside(certificate)),
     )
 
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from tubecert.bounds.meanings import meaning
 from tubecert.certificate.effective import ObstacleView
 from tubecert.certificate.result import Result
 from tubecert.digits import near
@@ -208,12 +209,12 @@ def _places(result: Result) -> dict[tuple[float, ...], list[str]]:
     n = len(result.spec.effective.system.states)
     near = _NEAR * (0.0 if result.tube is None else float(result.tube.rho))
     found: dict[tuple[float, ...], list[str]] = {}
-    for _, item in sorted(result.constants.items()):
+    for name, item in sorted(result.constants.items()):
         at = item.at
         if at is not None and len(at.x) == n and item.above != 0:
             here = tuple(float(f"{value:.4g}") for value in at.x)
             place = next((x for x in found if math.dist(x, here) <= near), here)
-            found.setdefault(place, []).append(item.symbol)
+            found.setdefault(place, []).append(meaning(name).symbol)
     return found
 
 

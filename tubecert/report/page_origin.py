@@ -114,7 +114,8 @@ def provenance(certificate: Certificate) -> Iterator[Block]:
         ("specification, the file", Cell(text=result.spec.file_hash, kind="code")),
         ("format", Cell(text=certificate.format)),
     ]
-    facts.append(("effort", Cell(text=_list(to_json(result.effort)))))
+    if result.effort is not None:
+        facts.append(("effort", Cell(text=_list(to_json(result.effort)))))
     if run.command:
         facts.append(("command", Cell(text=run.command, kind="code")))
     if run.versions:

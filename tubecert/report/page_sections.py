@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from tubecert.bounds.meanings import EVERY
+from tubecert.bounds.meanings import EVERY, meaning
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
@@ -359,12 +359,12 @@ def _order(constants: Mapping[str, Bound]) -> list[str]:
 
 
 def _constant(result: Result, name: str, item: Bound) -> tuple[Cell, ...]:
-    at = "" if item.at is None else claimed.point(result, item.at)
+    at, own = "" if item.at is None else claimed.point(result, item.at), meaning(name)
     return (
-        Cell(text=item.symbol, kind="code"),
+        Cell(text=own.symbol, kind="code"),
         Cell(text=sections.described(name), note=f"at {at}" if at else ""),
         Cell(text=sections.proven(name, item), kind="number"),
-        Cell(text=item.unit if item.unit != "1" else UNKNOWN),
-        Cell(text=item.equation),
+        Cell(text=own.unit if own.unit != "1" else UNKNOWN),
+        Cell(text=own.equation),
         Cell(text=sections.gap(item), kind="number"),
     )

@@ -130,12 +130,12 @@ def clearances(result: Result) -> Iterator[str]:
         zip(result.spec.effective.obstacles, result.clearance, strict=False), start=1
     ):
         where = f"obstacle {number} ({', '.join(obstacle.states)})"
-        when = f"nearest at t = {short(own.t, 4)} s"
+        when = "" if own.t is None else f"; nearest at t = {short(own.t, 4)} s"
         if own.verdict is Verdict.CERTIFIED:
-            yield f"clear of {where} by at least {down(own.clearance.below)}; {when}"
+            yield f"clear of {where} by at least {down(own.clearance.below)}{when}"
         else:
             told = "the tube meets it" if own.verdict is Verdict.REFUTED else "the tube may meet it"
-            yield f"{where}: {told}; {when}" + ("" if own.decides else " (does not decide)")
+            yield f"{where}: {told}{when}" + ("" if own.decides else " (does not decide)")
 
 
 def input_lines(result: Result, own: InputData) -> Iterator[str]:

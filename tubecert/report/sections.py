@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tubecert.bounds.meanings import EVERY
+from tubecert.bounds.meanings import meaning
 from tubecert.certificate.result import Bound, MetricData, Result, TubeData
 from tubecert.claims.assumptions import HardwareLeftOut
 from tubecert.claims.family import Reason
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Section = tuple[str, list["RenderableType"]]
-MEANINGS = EVERY
 VERDICTS = {Verdict.CERTIFIED: "green", Verdict.REFUTED: "red", Verdict.UNDECIDED: "yellow"}
 
 
@@ -208,7 +207,8 @@ def metric_bounds(metric: MetricData, tube: TubeData | None) -> Iterator[tuple[s
 def _constants(result: Result) -> Table:
     table = plain_table("symbol", "what it is, and where", ">proven", "unit", ">gap", wrapped=1)
     for name, item in result.constants.items():
-        table.add_row(item.symbol, _described(result, name, item), proven(name, item), item.unit, gap(item))
+        own = meaning(name)
+        table.add_row(own.symbol, _described(result, name, item), proven(name, item), own.unit, gap(item))
     return table
 
 
@@ -221,14 +221,12 @@ def _described(result: Result, name: str, item: Bound) -> Text:
 
 def described(name: str) -> str:
     """A constant in words, whatever its name."""
-    meaning = MEANINGS.get(name)
-    return name.replace("_", " ") if meaning is None else meaning.words
+    return meaning(name).words
 
 
 def proven(name: str, item: Bound) -> str:
     """The side that the certificate uses: from below for an infimum, from above for a supremum."""
-    meaning = MEANINGS.get(name)
-    if meaning is not None and meaning.side == "below":
+    if meaning(name).side == "below":
         return f">= {down(item.below, 6)}"
     return f"<= {up(item.above, 6)}"
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from tubecert.certificate.metric_file import MetricFile
-    from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SynthesisData
+    from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SearchData
     from tubecert.spec import Spec
 
 FLOORS = {"identity": "condition", "input": "input gain"}
@@ -43,7 +43,7 @@ _CAUSES = {
 }
 
 
-def verdict_line(data: SynthesisData, file: MetricFile | None, name: str) -> Text:
+def verdict_line(data: SearchData, file: MetricFile | None, name: str) -> Text:
     """What came of it, on one line."""
     if file is None:
         line = Text.assemble((data.verdict, f"bold {VERDICTS[data.verdict]}"), (f" {name}: ", "bold"))
@@ -55,7 +55,7 @@ def verdict_line(data: SynthesisData, file: MetricFile | None, name: str) -> Tex
     return line
 
 
-def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: str) -> list[RenderableType]:
+def report(data: SearchData, file: MetricFile | None, system: Spec, target: str) -> list[RenderableType]:
     """The whole report as renderables; `target` is the metric file."""
     name = system.name
     parts: list[RenderableType] = [verdict_line(data, file, name)]
@@ -75,7 +75,7 @@ def report(data: SynthesisData, file: MetricFile | None, system: Spec, target: s
     return [*parts, Text(), Text(f"Metric: {target}"), Text(certify, style="dim")]
 
 
-def _failure(data: SynthesisData, states: Sequence[str]) -> list[RenderableType]:
+def _failure(data: SearchData, states: Sequence[str]) -> list[RenderableType]:
     """What would help, and what was tried."""
     parts: list[RenderableType] = []
     reason = data.reason

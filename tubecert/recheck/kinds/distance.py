@@ -17,8 +17,6 @@ from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import (
-    all_of,
-    at_least,
     margin_at_least,
     not_shown_to_hold,
     told,
@@ -26,7 +24,7 @@ from tubecert.recheck.kinds.bounds import (
     words,
 )
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
-from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
+from tubecert.recheck.kinds.printed import GAINS, read_gains
 from tubecert.recheck.metric import stated
 from tubecert.recheck.predictor import Gains
 
@@ -61,14 +59,12 @@ class DistanceRecipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DistanceSection(Section):
-    """The pairs of least bandwidth, of least rate, the one asked for; the curve."""
+    """The pairs of least bandwidth, of least rate, the one asked for."""
 
     split: DistancePair | None
     least_adaptation: DistancePair | None
     asked: DistancePair | None
     ultimate_radius: Fraction | None
-    curve: tuple[Point, ...]
-    around: Around | None
 
     @property
     def pairs(self) -> dict[str, DistancePair]:
@@ -82,7 +78,6 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
 
     key: ClassVar = "distance"
     conditions: ClassVar = ("distance",)
-    elastic: ClassVar = True
 
     def read(self, node: Node) -> DistanceSection:
         """The section `distance`."""
@@ -95,11 +90,6 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
             own[key].decimal() for key in ("speed", "prediction_error", "uncertainty")
         )
         return DistanceRecipe(read_gains(own), speed, error, uncertainty)
-
-    def projection_radii(self, section: DistanceSection) -> Iterator[Fraction]:
-        """Those of its pairs."""
-        for pair in section.pairs.values():
-            yield pair.gains.projection_radius
 
     def asked(self, section: DistanceSection, given: Asked) -> Statements:
         """There is a pair that was asked for if gains were, and it has them."""
@@ -129,7 +119,7 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
     def claims(
         self, section: DistanceSection, recipe: DistanceRecipe | None, ground: Ground
     ) -> Iterator[Claim]:
-        """Every pair with its margin and radius, the curve."""
+        """Every pair with its margin and radius."""
         certified = section.verdict == "certified"
         for k, (name, pair) in enumerate(section.pairs.items()):
             decides = k == 0
@@ -147,38 +137,23 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
                     (section, pair),
                     lambda pair=pair: _agreed(section, pair),  # type: ignore[misc]
                 )
-        setting, R_H, curve, around = (
-            ground.setting,
-            ground.projection_radius,
-            section.curve,
-            section.around,
-        )
-        yield ground.claim(
-            "B: the curve is feasible", (curve, R_H), lambda: _curve_holds(curve, R_H, setting)
-        )
-        if around is not None:
-            yield ground.claim(
-                "B: margins around", (around, R_H), lambda: _around_holds(around, R_H, setting)
-            )
 
 
 # -- reading
 
 
 def _section(node: Node) -> DistanceSection:
-    keys = ("verdict", "split", "least_adaptation", "asked", "ultimate_radius", "curve", "shortfalls")
-    own = node.closed(*keys, optional=("margins_around",))
+    keys = ("verdict", "split", "least_adaptation", "asked", "ultimate_radius", "shortfalls")
+    own = node.closed(*keys)
     found = DistanceSection(
         verdict=own["verdict"].word(*VERDICTS),
         split=own.known("split", _pair),
         least_adaptation=own.known("least_adaptation", _pair),
         asked=own.known("asked", _pair),
         ultimate_radius=own.known("ultimate_radius", Node.number),
-        curve=printed.read_curve(own["curve"]),
-        around=own.get("margins_around", lambda item: printed.read_around(item, ("margin",))),
         shortfalls=printed.read_shortfalls(own["shortfalls"]),
     )
-    if not found.pairs and (found.verdict == "certified" or found.curve or found.around):
+    if not found.pairs and found.verdict == "certified":
         raise node.refused("has no pair of gains")
     return found
 
@@ -237,27 +212,3 @@ def _agreed(section: DistanceSection, decisive: DistancePair) -> Outcome:
     """The radius in the long run that B prints is that of its pair."""
     own, shown = decisive.ultimate_radius, section.ultimate_radius
     return stated(shown is None or (own is not None and own <= shown), "it is not that of the pair")
-
-
-def _curve_holds(curve: tuple[Point, ...], R_H: Fraction, setting: Setting) -> Outcome:
-    """Every point of the curve is feasible."""
-    return all_of(
-        stated(
-            bool(_own_margin(setting, point.at(R_H)) > 0),
-            f"the point at bandwidth {float(point.bandwidth):.6g} is not feasible",
-        )
-        for point in curve
-    )
-
-
-def _around_holds(around: Around, R_H: Fraction, setting: Setting) -> Outcome:
-    """The margins that are printed along the bandwidth."""
-    return all_of(
-        at_least(
-            _own_margin(setting, around.at(k, R_H)),
-            below,
-            f"the distance at bandwidth {float(around.bandwidths[k]):.6g}",
-        )
-        for k, below in enumerate(around.margins["margin"])
-        if below is not None
-    )

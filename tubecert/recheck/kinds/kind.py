@@ -54,14 +54,13 @@ class Asked:
 class Ground:
     """What claims about gains rest on: the constants on their safe sides, and as they are printed.
 
-    `depends` is everything that the setting was made of; `projection_radius` is that of the pairs of A and B. `silent`:
-    the section is printed as if there were no disturbance, of which it says that it covers none.
+    `depends` is everything that the setting was made of. `silent`: the section is printed as if there were no
+    disturbance, of which it says that it covers none.
     """
 
     setting: Setting
     constants: Mapping[str, Enclosure]
     depends: tuple[object, ...]
-    projection_radius: Fraction
     silent: bool = False
 
     def claim(self, name: str, parts: tuple[object, ...], examine: Callable[[], Outcome]) -> Claim:
@@ -84,15 +83,12 @@ R = TypeVar("R")
 class Kind(ABC, Generic[S, R]):
     """One kind: S is its section, R its recipe.
 
-    `conditions` are those that it may say are not proven, `unread` the members of its section that are shown and not
-    verified; `elastic` says whether a certificate tells how its least rate reacts to each constant, `adapts` whether it
-    is about the adaptive loop, and so one of those that decide where all do.
+    `conditions` are those that it may say are not proven; `adapts` says whether it is about the adaptive loop, and so
+    one of those that decide where all do.
     """
 
     key: ClassVar[str]
     conditions: ClassVar[tuple[str, ...]]
-    unread: ClassVar[tuple[str, ...]] = ()
-    elastic: ClassVar[bool] = False
     adapts: ClassVar[bool] = True
 
     @abstractmethod
@@ -130,8 +126,3 @@ class Kind(ABC, Generic[S, R]):
         """What is added to u*, where the recipe is a proof; None if the theorem does not say."""
         del section, recipe, ground
         return None
-
-    def projection_radii(self, section: S) -> Iterator[Fraction]:
-        """R_H of every pair of gains that shares its controller with A and B."""
-        del section
-        yield from ()

@@ -15,7 +15,6 @@ from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import (
     all_of,
-    at_least,
     at_most,
     margin_at_least,
     not_shown_to_hold,
@@ -24,8 +23,8 @@ from tubecert.recheck.kinds.bounds import (
     words,
 )
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
-from tubecert.recheck.kinds.printed import GAINS, Around, Point, read_gains
-from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.kinds.printed import GAINS, read_gains
+from tubecert.recheck.metric import stated
 from tubecert.recheck.predictor import Gains
 
 CONDITIONS = ("26a", "26b", "26c")
@@ -56,14 +55,11 @@ class RatePair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RateSection(Section):
-    """The pair that the verdict is about, that of least rate, the curve."""
+    """The pair that the verdict is about, that of least rate."""
 
     pair: RatePair | None
     ultimate_radius: Fraction | None
     least_adaptation: RatePair | None
-    curve: tuple[Point, ...]
-    around: Around | None
-    binds: str | None
 
 
 class Rates(Kind[RateSection, Gains]):
@@ -71,8 +67,6 @@ class Rates(Kind[RateSection, Gains]):
 
     key: ClassVar = "conditions_26"
     conditions: ClassVar = CONDITIONS
-    unread: ClassVar = ("bandwidth_infimum", "binds")
-    elastic: ClassVar = True
 
     def read(self, node: Node) -> RateSection:
         """The section `conditions_26`."""
@@ -86,12 +80,6 @@ class Rates(Kind[RateSection, Gains]):
         """What follows from gains, where there are any."""
         return DERIVED if node.mapping().get("bandwidth") is not None else ()
 
-    def projection_radii(self, section: RateSection) -> Iterator[Fraction]:
-        """Those of its pairs."""
-        for pair in (section.pair, section.least_adaptation):
-            if pair is not None:
-                yield pair.gains.projection_radius
-
     def uncovered(self, setting: Setting) -> str | None:
         """A disturbance of any kind."""
         return None if setting.still else "wind_not_covered"
@@ -104,12 +92,10 @@ class Rates(Kind[RateSection, Gains]):
             yield same, f"overrides.{name} is not what {self.key} judges"
 
     def said(self, section: RateSection) -> dict[str, object]:
-        """Margins, and which condition binds."""
+        """Margins."""
         if section.pair is None:
             return {}
-        below = {claim: margin.below for claim, margin in section.pair.margins.items()}
-        own: dict[str, object] = {"margins": below}
-        return own if section.binds is None else {**own, "binds": section.binds}
+        return {"margins": {claim: margin.below for claim, margin in section.pair.margins.items()}}
 
     def shares(self, section: RateSection, recipe: Gains, ground: Ground) -> Shares:
         """Of the distance theorem A says that it stays below dbar."""
@@ -118,21 +104,13 @@ class Rates(Kind[RateSection, Gains]):
         return Shares(setting.n.feedback_gain * setting.reach, recipe.projection_radius)
 
     def claims(self, section: RateSection, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
-        """Constants, margins, radius, curve."""
+        """Constants, margins, radius."""
         if section.pair is not None:
             yield from _of_pair(section, section.pair, recipe, ground)
-        setting, R_H, least = ground.setting, ground.projection_radius, section.least_adaptation
+        setting, least = ground.setting, section.least_adaptation
         if least is not None:
             name = f"A: (26a)-(26c) at {words(least.gains)}"
             yield ground.claim(name, (least,), lambda: _margins_hold(least, setting))
-        curve, around = section.curve, section.around
-        yield ground.claim(
-            "A: the curve is feasible", (curve, R_H), lambda: _curve_holds(curve, R_H, setting)
-        )
-        if around is not None:
-            yield ground.claim(
-                "A: margins around", (around, R_H), lambda: _around_holds(around, R_H, setting)
-            )
 
 
 # -- reading
@@ -145,13 +123,8 @@ def _section(node: Node) -> RateSection:
         *gains,
         "ultimate_radius",
         "least_adaptation",
-        "curve",
-        "bandwidth_infimum",
-        "binds",
         "shortfalls",
-        optional=("margins_around",),
     )
-    own.known("bandwidth_infimum", Node.number)
     verdict = own["verdict"].word(*VERDICTS)
     present = [own[key].value is not None for key in gains]
     if any(present) != all(present) or (verdict == "certified" and not all(present)):
@@ -161,9 +134,6 @@ def _section(node: Node) -> RateSection:
         pair=RatePair(read_gains(own), _margins(own["margins"])) if all(present) else None,
         ultimate_radius=own.known("ultimate_radius", Node.number),
         least_adaptation=own.known("least_adaptation", _pair),
-        curve=printed.read_curve(own["curve"]),
-        around=own.get("margins_around", lambda item: printed.read_around(item, CONDITIONS)),
-        binds=own.known("binds", Node.text),
         shortfalls=printed.read_shortfalls(own["shortfalls"]),
     )
 
@@ -225,28 +195,3 @@ def _derived_hold(constants: dict[str, Enclosure], setting: Setting, at: Gains) 
     found = derived(setting, at)
     tops = {name: top for name in found if (top := constants[name].above) is not None}
     return all_of(at_most(found[name], top, name) for name, top in tops.items())
-
-
-def _curve_holds(curve: tuple[Point, ...], R_H: Fraction, setting: Setting) -> Outcome:
-    """Every point of the curve is feasible."""
-    return all_of(
-        stated(
-            all(value > 0 for value in margins_26(setting, point.at(R_H)).values()),
-            f"the point at bandwidth {float(point.bandwidth):.6g} is not feasible",
-        )
-        for point in curve
-    )
-
-
-def _around_holds(around: Around, R_H: Fraction, setting: Setting) -> Outcome:
-    """The margins that are printed along the bandwidth."""
-    return all_of(_along(around, R_H, setting)) if around.bandwidths else CONFIRMED
-
-
-def _along(around: Around, R_H: Fraction, setting: Setting) -> Iterator[Outcome]:
-    for k, bandwidth in enumerate(around.bandwidths):
-        found = margins_26(setting, around.at(k, R_H))
-        for claim, values in around.margins.items():
-            below = values[k]
-            if below is not None:
-                yield at_least(found[claim], below, f"({claim}) at bandwidth {float(bandwidth):.6g}")
