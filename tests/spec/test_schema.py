@@ -24,7 +24,6 @@ from tubecert.bounds.constants import DERIVED, TABLE, WIND
 from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Certificate
 from tubecert.errors import TubecertError
-from tubecert.records import to_json
 from tubecert.spec.load import load, load_question, load_system, load_text
 from tubecert.spec.metric_file import with_metric
 from tubecert.spec.reader import Field
@@ -314,7 +313,7 @@ def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
     )
     assert not [f"{error.json_path}: {error.message}" for error in CLOSED.iter_errors(sealed)]
     assert not errors("spec", sealed["result"]["spec"]["effective"])
-    again = to_json(Certificate.from_json(sealed))
+    again = Certificate.from_json(sealed).to_json()
     assert certificate.dump(again) == certificate.dump(sealed), "read and written again, byte for byte"
 
 

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.follows import ClearanceData, InputData
-from tubecert.certificate.notes import joined
+from tubecert.certificate.notes import joined, split
 from tubecert.certificate.searched import SynthesisData
 from tubecert.claims.family import Assumption, Reason
 from tubecert.conditions.theorem import Recipe
@@ -313,3 +313,14 @@ class Certificate:
             raise FormError("certificate.notes", "is missing")
         own = {key: value for key, value in data.items() if key != "notes"}
         return from_json(cls, own | {"result": joined(data.get("result"), data["notes"])}, "certificate")
+
+    def to_json(self) -> Json:
+        """What the file says."""
+        result, notes = split(self.result.to_json())
+        return {
+            "format": self.format,
+            "hash": self.hash,
+            "result": result,
+            "notes": notes,
+            "run": to_json(self.run),
+        }
