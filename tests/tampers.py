@@ -65,16 +65,10 @@ def verified(old, new):
 
 
 HARMLESS = [
-    # labels and prose: nothing reads them
-    (r"constants\.\w+\.(symbol|equation|unit|at)\b.*", anything),
-    (r"reasons\[\]\.(binds|predictor_gain|relax|at)\b.*", anything),
+    (r"reasons\[\]\.predictor_gain", anything),
     (r"reasons(\[\])?", anything),  # an explanation less
-    (r"plan\.(curve|file|file_hash|samples)\b.*", anything),
+    (r"plan\.(curve|file|file_hash)\b.*", anything),
     (r"spec\.file_hash", anything),  # compared with the file itself by --spec
-    # orientation
-    (r"(effort|elasticities)\b.*", anything),
-    (r"conditions_26\.(bandwidth_infimum|binds)", anything),
-    (r"\w+\.margins_around\b.*", anything),
     # the sides of intervals that no claim uses; upper ends of margins
     (r"constants\.(?!lower\.)\w+\.below", anything),
     (r"constants\.lower\.above", anything),
@@ -97,7 +91,6 @@ HARMLESS = [
     # gains that are examined as they stand: another point that serves
     (r"conditions_26\.least_adaptation(\.\w+)?", verified),
     (r"distance\.(split|asked)(\.\w+)?", verified),
-    (r"\w+\.curve(\[\](\.\w+)?)?", verified),
     (r"plan\.knots\.\w+\[\](\[\])?", verified),  # another plan, examined as it stands
     # a recipe may be any that serves
     (r"proof\.distance\.(speed|prediction_error|uncertainty)", verified),
@@ -330,11 +323,8 @@ MAY_BE_ADDED = [
     r"spec\.effective\.system\.(units|parameters)\.\w+",
     r"spec\.effective\.(expect|simulation|obstacles)",
     r"overrides\.\w+",
-    r"reasons\[\]\.(binds|predictor_gain|relax|at)",
-    r"constants\.\w+\.at(\.t)?",
-    r"elasticities\.\w+\.\w+",
-    r"plan\.samples",
-    r"run\b.*",
+    r"reasons\[\]\.predictor_gain",
+    r"(notes|run)\b.*",
 ]
 
 
@@ -348,13 +338,7 @@ OF_STRUCTURE = [
     (r"spec\.effective\.(name|expect|simulation|obstacles)\b.*", anything),
     (r"spec\.effective\.system\.(units|parameters)\b.*", anything),
     (r"spec\.effective\.trajectory\.(Q|R|knots|file)\b.*", anything),  # how the plan was found
-    (r"spec\.effective\.metric\.bounds\b.*", anything),  # declared, and nothing rests on them
-    (r"(\w+\.)*curve\[\]", anything),  # a point less, twice, or elsewhere in the list
     (r"(reasons|decided_by)\[\]", anything),
-    (r"reasons\[\]\.relax\[\].*", anything),
-    (r"(synthesis|elasticities)\b.*", anything),
-    (r"\w+\.margins_around", anything),
-    (r"plan\.samples", anything),
 ]
 
 

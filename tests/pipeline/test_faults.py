@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import pickle
 from dataclasses import replace
 from fractions import Fraction
@@ -222,9 +221,7 @@ def test_what_a_lying_search_leaves_certified_is_confirmed(monkeypatch):
     assert result["verdict"] == "certified"
     found = recheck(certificate.dump(certificate.seal(result, {})), "made")
     assert found.verdict == "confirmed", found.failing
-    assert (
-        json.loads(certificate.dump(certificate.seal(result, {})))["result"]["conditions_26"]["curve"] == []
-    )
+    assert "curve" not in result["conditions_26"]
 
 
 # --- the kernel itself

@@ -264,7 +264,12 @@ def test_an_unknown_member_is_refused_wherever_it_stands(plans, kind):
     document["result"]["overrides"] = {}
     seen = 0
     for path, holder in objects(document):
-        if path in THEIRS or path.count("[") > 1 or ("[" in path and "[0]" not in path):
+        if (
+            path in THEIRS
+            or not path.startswith("certificate.result")
+            or path.count("[") > 1
+            or ("[" in path and "[0]" not in path)
+        ):
             continue
         holder["u_max"] = 5.0
         message = refused(document)
@@ -277,19 +282,15 @@ def test_an_unknown_member_is_refused_wherever_it_stands(plans, kind):
 def removable(document):
     """Every member that can be taken out one at a time, long lists once."""
     for path, holder in objects(document):
-        if path.count("[") > 1 or ("[" in path and "[0]" not in path):
+        beside = path.startswith(("certificate.notes", "certificate.run"))  # not examined
+        if beside or path.count("[") > 1 or ("[" in path and "[0]" not in path):
             continue
         for key in list(holder):
             yield f"{path}.{key}".removeprefix("certificate."), holder, key
 
 
 HARMLESS = (
-    "run.",
-    "result.plan.samples",
-    "result.conditions_26.margins_around",
-    "result.distance.margins_around",
     "result.reasons[0].",  # an explanation less
-    "result.elasticities.",
     "result.spec.effective.system.parameters.",
     "result.spec.effective.system.units.",
     "result.spec.effective.simulation",
@@ -331,10 +332,10 @@ def test_a_member_that_is_missing_is_refused(plans, kind):
         except TubecertError as error:
             codes.add(error.findings[0].code)
         holder[key] = value
-    assert [path for path in accepted if not path.endswith((".at", ".t"))] == []
+    assert accepted == []
     assert "TC603" in codes
     assert ("TC601" in codes) == (not before)  # what makes it a certificate at all
-    assert seen > (20 if before else 250)
+    assert seen > (15 if before else 150)
 
 
 # -- numbers -------------------------------------------------------------------------------------------------------
@@ -376,8 +377,6 @@ PLACES = [
     ("constants", "h", "below"),
     ("distance", "least_adaptation", "bandwidth"),
     ("conditions_26", "predictor_gain"),
-    ("effort", "gap"),
-    ("effort", "budget"),
     ("spec", "effective", "tube", "epsilon"),
     ("spec", "effective", "metric", "rate"),
     ("spec", "effective", "initial_state", "at"),

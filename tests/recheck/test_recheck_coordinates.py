@@ -47,7 +47,7 @@ def in_coordinates():
     """What was proven in z, told of the system in x; half-widths a little more than needed."""
     document, found = copy.deepcopy(certified(IN_X)), certified(IN_Z)["result"]
     result = document["result"]
-    result |= copy.deepcopy({key: found[key] for key in (*FROM_Z, "elasticities")})
+    result |= copy.deepcopy({key: found[key] for key in FROM_Z})
     for key in ("lower", "upper", "unique_geodesics"):
         result["metric"][key] = found["metric"][key]
     reach = found["tube"]["rho"] * found["constants"]["lower"]["below"] ** 0.5 * (1 + 1e-9)

@@ -126,28 +126,6 @@ def test_a_plan_spans_its_horizon():
 
 
 @pytest.mark.slow
-def test_what_is_drawn_of_a_plan_lies_on_it():
-    document = planned()
-    document["result"]["plan"]["samples"]["x"][70][0] += 0.01
-    assert names(examine(sealed(document), 20)) >= {"what is drawn of the plan lies on it"}
-    document = certified(SMALL)
-    document["result"]["plan"]["samples"]["x"][0][0] = 0.2
-    assert "what is drawn of the plan lies on it" in names(examine(sealed(document), 20))
-
-
-@pytest.mark.slow
-def test_margins_drawn_around_the_gains_are_proven():
-    """A figure shows them: they must not be better than they are."""
-    for section, key in (("conditions_26", "26a"), ("distance", "margin")):
-        document = certified(SMALL, bare=False)
-        margins = document["result"][section]["margins_around"][key]
-        k = next(k for k, value in enumerate(margins) if value is not None)
-        margins[k] += 0.01
-        (name,) = names(examine(sealed(document), 2_000))
-        assert name.endswith("margins around")
-
-
-@pytest.mark.slow
 def test_a_contraction_that_exceeds_its_rate_is_confirmed():
     """R7: a largest eigenvalue may be negative; a true certificate was contradicted."""
     text = (

@@ -345,7 +345,7 @@ def test_recheck_refuses_what_is_no_family(document, name):
     assert {item.code for item in caught.value.findings} <= {"TC601", "TC603"}
 
 
-def test_samples_of_a_family_are_refused(document):
+def test_samples_in_a_result_are_refused(document):
     from tubecert.errors import TubecertError
 
     forged = changed(document, lambda r: r["plan"].update(samples={"t": [0.0], "x": [[0.0, 0.0]]}))

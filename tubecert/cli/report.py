@@ -16,6 +16,7 @@ from tubecert.files import STDIN
 from tubecert.library.certification import read
 from tubecert.library.pages import REMEDY, Report, require_page, simulated_in
 from tubecert.printable import printable_json, visible
+from tubecert.report.claimed import NOT_RECHECKED
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
@@ -36,7 +37,7 @@ def run(source: str, targets: Sequence[str] | None, simulation: str | None, outp
     if output.json:
         write_stdout(printable_json(json.dumps({"pages": pages}, ensure_ascii=False)) + "\n")
     elif not output.quiet:
-        write_stdout("".join(f"page {visible(page)}\n" for page in pages))
+        write_stdout("".join(f"page {visible(page)}\n" for page in pages) + f"{NOT_RECHECKED}\n")
 
 
 def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) -> None:

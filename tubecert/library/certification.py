@@ -148,7 +148,7 @@ class Certification:
         return MappingProxyType({}) if self.deciding is None else self.deciding.margins
 
     def curve(self, kind: str) -> Array:
-        """Points (K, 2) that are proven for a kind, by its letter.
+        """Points (K, 2) that were found to serve for a kind, by its letter: a note, which recheck does not examine.
 
         Bandwidth in rad/s and adaptation rate; (0, 2) where there is none. Raises `KeyError` for no kind.
         """
@@ -243,7 +243,7 @@ class Certification:
     def plot_tradeoff(self, ax: Axes | None = None) -> Axes:
         """Draw what each bandwidth needs of the adaptation rate, by kind of certificate; returns the axes.
 
-        Every point is proven. Needs matplotlib (the extra `simulate`).
+        The curves are notes, which recheck does not examine. Needs matplotlib (the extra `simulate`).
         """
         from tubecert.library import figures
 

@@ -134,7 +134,7 @@ EXAMINED: Final[Mapping[str, str]] = {
         for key in ("margin", "ultimate_radius")
     },
     **{
-        f"{section}.shortfalls.{key}": _VERDICT
+        f"{section}.shortfalls.{key}": NOTHING  # of what is not certified
         for section in ("no_adaptation", "conditions_26", "distance")
         for key in ("condition", "margin")
     },
@@ -148,6 +148,7 @@ EXAMINED: Final[Mapping[str, str]] = {
             f"{section}.projection_radius",
         )
     },
+    "proof.no_adaptation": _0,
     "proof.distance.speed": _B,
     "proof.distance.prediction_error": _B,
     "proof.distance.uncertainty": _B,
@@ -216,10 +217,14 @@ EXAMINED: Final[Mapping[str, str]] = {
 }
 
 
+def met(result: Node) -> tuple[str, ...]:
+    """The rows of what stands in a result; raises `CertificateError` for a key that has none."""
+    return tuple(dict.fromkeys(_met(result, _TREE)))
+
+
 def not_examined(result: Node) -> tuple[str, ...]:
-    """The rows of a result that no claim examines; raises `CertificateError` for a key that has no row."""
-    met = dict.fromkeys(_met(result, _TREE))
-    return tuple(row for row in met if EXAMINED[row] in (NOTHING, FILE))
+    """Those that no claim examines."""
+    return tuple(row for row in met(result) if EXAMINED[row] in (NOTHING, FILE))
 
 
 _ROW = "row#"  # no key is written so
@@ -245,7 +250,7 @@ def _met(node: Node, place: Tree) -> Iterator[str]:
     """The rows of what stands at a place of the tree, and below it."""
     if _REST in place:
         yield place[_REST][_ROW]
-    elif isinstance(node.value, dict):
+    elif isinstance(node.value, dict) and (node.value or _ROW not in place):
         for key, own in node.items():
             inner = place.get(key, place.get("*"))
             if inner is None:

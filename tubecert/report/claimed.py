@@ -9,6 +9,10 @@ from tubecert.certificate.result import Plans, Result
 from tubecert.digits import end, short
 from tubecert.enclosure.constant import Witness
 
+NOT_RECHECKED = (
+    "Not rechecked: this is what the certificate says; whether it is true, tubecert recheck examines."
+)
+
 
 def span(result: Result) -> str:
     """The time that is claimed."""

@@ -19,6 +19,7 @@ from tubecert.certificate.effective import Tree
 from tubecert.certificate.result import Certificate, Result
 from tubecert.digits import UNKNOWN, down, exact, percent, up
 from tubecert.records import exact_json
+from tubecert.report.claimed import NOT_RECHECKED
 from tubecert.report.figures_comparison import comparison_figures
 from tubecert.report.page import Block, Cell, Figures, Page, Section, Table
 from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
@@ -117,7 +118,7 @@ def page_of_comparison(comparison: Comparison, *, all_of_it: bool = True) -> Pag
         name=", ".join(sorted(specifications)),
         verdict="",
         summary=f"{len(comparison.sides)} certificates{differ or ' of the same specification'}",
-        meaning="What the certificates state; tubecert recheck examines one.",
+        meaning=NOT_RECHECKED,
         tiles=(),
         sections=tuple(_sections(comparison, all_of_it=all_of_it)),
         about="comparison",

@@ -39,7 +39,7 @@ def gain_figures(result: Result) -> list[Figure]:
         chart.dot(place, f"{style} decides" if row.decides else style, 6 if row.decides else 4.5, _told(row))
     if any(row.decides for row, _ in chosen):
         legend.append(("decides", "decides the verdict"))
-    caption = "Every point of a curve is a proven pair."
+    caption = "Points of a curve were found to serve: computed, not examined by recheck."
     return [Figure(key="trade-off", title=title, svg=chart.text(), legend=tuple(legend), caption=caption)]
 
 

@@ -131,7 +131,9 @@ def check_again(certificate: Certificate) -> Iterator[Block]:
     name = shlex.quote(f"{certificate.result.spec.effective.name}.certificate.json")
     yield Words(
         text="This page shows a certificate and proves nothing itself. The certificate, a JSON file with the hash "
-        "above, is what can be checked: without a solver, in another arithmetic, and against its specification."
+        "above, is what can be checked: without a solver, in another arithmetic, and against its specification. "
+        "Advice, curves of gains, where constants are largest and points to draw the plan by are its notes: computed, "
+        "not hashed, not examined by recheck."
     )
     yield Listing(text=f"tubecert recheck {name}\ntubecert recheck {name} --spec SPEC.yaml")
     yield Words(

@@ -69,7 +69,7 @@ def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Pag
         name=console.name(result),
         verdict=result.verdict,
         summary=line.partition(": ")[2],
-        meaning=console.meaning(result).plain,
+        meaning=f"{console.meaning(result).plain} {claimed.NOT_RECHECKED}",
         tiles=tuple(_tiles(result)),
         sections=tuple(_sections(certificate, simulated)),
     )
@@ -341,7 +341,8 @@ def _constants(result: Result) -> Iterator[Block]:
     figures = tuple(suprema_figures(result))
     if figures:
         yield Words(
-            text="Where in the tube, with all of its radius, each constant was found largest or smallest:"
+            text="Where in the tube, with all of its radius, each constant was found largest or smallest "
+            "(computed, not examined by recheck):"
         )
         yield Figures(figures=figures, places=places(result))
     yield Table(
