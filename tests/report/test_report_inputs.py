@@ -107,4 +107,4 @@ def test_a_lock_without_limits_is_not_met():
 @pytest.mark.slow
 def test_what_is_read_back_is_what_was_written():
     made = proven(ONE + "limits: {u: [-1, 0.25]}\n", conditions="distance")
-    assert json.loads(json.dumps(Certificate.from_json(made).result.to_json())) == made["result"]
+    assert json.loads(json.dumps(Certificate.from_json(made).to_json())) == made
