@@ -67,7 +67,7 @@ def test_every_section_of_the_specification_is_compared(tmp_path):
         "hardware": {"sample_time": "0.01", "delay": "0", "noise": "0"},
         "metric": {"rate": "0.8", "dual_metric": [["1", "0"], ["0", "1"]]},
         "trajectory": {"kind": "equilibrium", "at": ["0.1", "0"], "input": ["0"]},
-        "system": document["result"]["spec"]["effective"]["system"] | {"f": [["x"], ["y"]]},
+        "system": document["result"]["spec"]["effective"]["system"] | {"f": ["x", "y"]},
     }
     for key, value in changes.items():
 

@@ -8,11 +8,9 @@ both as one again. Trusted: yes, for what is not in `notes` is taken for examine
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from tubecert.records import FormError
 
-Json = Any
 Tree = Mapping[str, "Tree"]
 
 _WHOLE: Tree = {}
@@ -33,12 +31,12 @@ NOTES: Tree = {
 """The places of notes by their keys, `*` for any; those of the entries of a list are those of each entry."""
 
 
-def split(found: Json) -> tuple[Json, Json]:
+def split(found: object) -> tuple[object, object]:
     """`result` and `notes` of everything that was found."""
     return _split(found, NOTES)
 
 
-def joined(result: Json, notes: Json) -> Json:
+def joined(result: object, notes: object) -> object:
     """Everything that was found; raises `FormError` if `notes` hold something that is no note."""
     whole = _joined(result, notes)
     if split(whole) != (result, notes):
@@ -46,7 +44,7 @@ def joined(result: Json, notes: Json) -> Json:
     return whole
 
 
-def _split(value: Json, tree: Tree) -> tuple[Json, Json]:
+def _split(value: object, tree: Tree) -> tuple[object, object]:
     if isinstance(value, list):
         parts = [_split(item, tree) for item in value]
         noted = [own for _, own in parts]
@@ -65,7 +63,7 @@ def _split(value: Json, tree: Tree) -> tuple[Json, Json]:
     return stays, told
 
 
-def _joined(stays: Json, told: Json) -> Json:
+def _joined(stays: object, told: object) -> object:
     if not told:
         return stays
     if isinstance(stays, dict) and isinstance(told, dict):

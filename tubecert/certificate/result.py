@@ -314,7 +314,7 @@ class Certificate:
         own = {key: value for key, value in data.items() if key != "notes"}
         return from_json(cls, own | {"result": joined(data.get("result"), data["notes"])}, "certificate")
 
-    def to_json(self) -> Json:
+    def to_json(self) -> dict[str, object]:
         """What the file says."""
         result, notes = split(self.result.to_json())
         return {

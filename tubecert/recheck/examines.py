@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from tubecert.recheck.document import Node
+from tubecert.recheck.kinds.table import KEYS
 
 NOTHING: Final = ""  # it claims nothing: for orientation
 FILE: Final = "--spec"  # it says which file, and no claim rests on it
@@ -124,6 +125,8 @@ EXAMINED: Final[Mapping[str, str]] = {
             ("distance.split", _B),
             ("distance.least_adaptation", _B),
             ("distance.asked", _B),
+            ("proof.conditions_26", "A: its recipe"),
+            ("proof.distance", _B),
         )
         for key in ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
     },
@@ -135,18 +138,8 @@ EXAMINED: Final[Mapping[str, str]] = {
     },
     **{
         f"{section}.shortfalls.{key}": NOTHING  # of what is not certified
-        for section in ("no_adaptation", "conditions_26", "distance")
+        for section in KEYS
         for key in ("condition", "margin")
-    },
-    **{
-        f"proof.{key}": claim
-        for section, claim in (("conditions_26", "A: its recipe"), ("distance", _B))
-        for key in (
-            f"{section}.bandwidth",
-            f"{section}.adaptation_rate",
-            f"{section}.predictor_gain",
-            f"{section}.projection_radius",
-        )
     },
     "proof.no_adaptation": _0,
     "proof.distance.speed": _B,
