@@ -12,7 +12,6 @@ from tubecert.enclosure import linalg
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.linalg import (
     congruence,
-    eigenvalues,
     eigenvalues_midrad,
     midrad,
     norm_bound,
@@ -54,6 +53,10 @@ def exact_norm(m):
     gram = b * b.transpose() if len(m) <= len(m[0]) else b.transpose() * b
     values = [v.real for v in gram.eig(multiple=True)]
     return max(values, key=lambda v: float(v.mid())).sqrt() * arb(2) ** -power
+
+
+def eigenvalues(s):
+    return eigenvalues_midrad(*midrad(s))
 
 
 def holds(ball, lo, hi):

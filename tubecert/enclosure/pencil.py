@@ -21,8 +21,6 @@ from tubecert.expression.matrix import identity
 
 _EXACT = 4e-15  # relative: what weights at a point may be rounded below the exact ones
 
-Ball = tuple[Array, Array]  # midpoints and radii of matrices
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weights:
@@ -55,8 +53,8 @@ class Pencil:
         """The floor where N < floor D is proven at once, elsewhere about the least bound, or what is enough."""
         own, top = len(self._own), self._top
         e, weights = self._function.expand(lo[:, :own], hi[:, :own]), self._ends(lo, hi)
-        balls = (_weighted(weights[part], e, part) for part in (slice(top), slice(top, None)))
-        vertices = Vertices(self._frame(hi, e), *balls)
+        halves = (slice(top), slice(top, None))
+        vertices = Vertices(self._frame(hi, e), *(_weighted(weights[k], e.balls()[k]) for k in halves))
         # weights answer for no tau below 0
         floor = target.floor if self._weights is None else max(target.floor, 0.0)
         low = vertices.below(np.full(len(lo), floor))
@@ -113,11 +111,12 @@ class Pencil:
     def lower(self, lo: Array, hi: Array) -> Array:
         """Rayleigh quotient of a proposed eigenvector, rounded down."""
         own = len(self._own)
-        values = self._function.at(lo[:, :own], hi[:, :own])
-        weights, top = [w[:, 0] for w in self._ends(lo, hi)], self._top
+        weights, top = [w[:, :1] for w in self._ends(lo, hi)], self._top
+        at = (midrad(g[:, None]) for g in self._function.at(lo[:, :own], hi[:, :own]))
+        balls = [Balls(mid, np.abs(mid), rad) for mid, rad in at]
         numerator, denominator = (
-            _sum_of_balls(weights[part], [midrad(g) for g in values[part]])
-            for part in (slice(top), slice(top, None))
+            (whole.mid[:, 0], whole.rad[:, 0])
+            for whole in (_weighted(weights[:top], balls[:top]), _weighted(weights[top:], balls[top:]))
         )
         t = whitening(denominator[0])
         v = np.einsum("nji,nj->ni", t, _eigenvectors(t, numerator[0])[..., -1])
@@ -211,9 +210,7 @@ class SumOfPencils:
     def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
         """For each i a value is guessed at the vertices, and proven of +-N_i."""
         e = self._function.expand(lo, hi)
-        denominator, *numerators = (
-            Balls(*parts) for parts in zip(e.mid, e.size, map(e.filled, range(len(e.mid))), strict=True)
-        )
+        denominator, *numerators = e.balls()
         t = whitening(e.mid[0].mean(axis=1))[:, None]
         total = np.zeros(len(lo))
         caused = np.zeros((lo.shape[1], len(lo)))
@@ -262,13 +259,20 @@ def _eigenvectors(t: Array, mid: Array) -> Array:
     return np.linalg.eigh(scaled)[1]
 
 
-def _weighted(weights: Sequence[Array], e: Expansion, part: slice) -> Balls:
-    """sum_k w_k (mid_k +- rad_k) for every end of the weights, (N, E V, n, n), with the roundings in the radius."""
-    filled, ends = [e.filled(k) for k in range(len(e.mid))[part]], e.rad[0].shape[1]
-    if _alone(weights):
-        return Balls(e.mid[part][0], e.size[part][0], filled[0])
-    mid, size, rad = (_mixed(weights, of, ends) for of in (e.mid[part], e.size[part], filled))
-    return Balls(mid, size * (1 + 1e-14), _rounded(rad, size, len(filled)))
+def _weighted(weights: Sequence[Array], balls: Sequence[Balls]) -> Balls:
+    """sum_k w_k B_k at F E A vertices, for B_k at F A of them, with the roundings in the radius.
+
+    K products and K - 1 additions: K u of the size (Higham 2002, eq. 3.5), K <= 7 for 1e-15 > 9 u; of radii, 90 u.
+    """
+    assert len(balls) <= 7
+    if len(balls) == 1 and weights[0].size == len(weights[0]) and np.all(weights[0] == 1.0):
+        return balls[0]
+    ends = balls[0].rad.shape[1]
+    mid, size, rad = (
+        _mixed(weights, of, ends)
+        for of in ([b.mid for b in balls], [b.size for b in balls], [b.rad for b in balls])
+    )
+    return Balls(mid, size * (1 + 1e-14), rad * (1 + 1e-14) + 1e-15 * size)
 
 
 def _mixed(weights: Sequence[Array], arrays: Sequence[Array], ends: int) -> Array:
@@ -279,29 +283,6 @@ def _mixed(weights: Sequence[Array], arrays: Sequence[Array], ends: int) -> Arra
         by_entry = w.reshape(count, 1, w.shape[1], 1, *(w.shape[2:] or (1, 1)))
         total = total + by_entry * a.reshape(count, -1, 1, ends, *shape)
     return total.reshape(count, -1, *shape)
-
-
-def _sum_of_balls(weights: Sequence[Array], balls: Sequence[Ball]) -> Ball:
-    """sum_k w_k (mid_k +- rad_k), w_k (N,) or, by entries, (N, n, n), with the roundings in the radius."""
-    if _alone(weights):
-        return balls[0]
-    by_entry = [w if w.ndim == 3 else w[:, None, None] for w in weights]
-    mid, size, rad = (
-        sum((w * a for w, a in zip(by_entry, of, strict=True)), start=np.zeros(()))
-        for of in ([m for m, _ in balls], [np.abs(m) for m, _ in balls], [r for _, r in balls])
-    )
-    return mid, _rounded(rad, size, len(balls))
-
-
-def _alone(weights: Sequence[Array]) -> bool:
-    """Whether the sum is one matrix itself."""
-    return len(weights) == 1 and weights[0].size == len(weights[0]) and bool(np.all(weights[0] == 1.0))
-
-
-def _rounded(rad: Array, size: Array, count: int) -> Array:
-    """The radius of a sum of so many products, K of them and K - 1 additions: K u of `size` (Higham 2002, eq. 3.5)."""
-    assert count <= 7  # for 1e-15 > 9 u; of radii, 90 u
-    return rad * (1 + 1e-14) + 1e-15 * size
 
 
 # -- what steers the search ------------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import midrad
 from tubecert.enclosure.tape import Tape
+from tubecert.enclosure.vertices import Balls
 from tubecert.expression import ZERO, Expression, derivatives, free_symbols, topological
 
 Matrix = Sequence[Sequence[Expression]]
@@ -56,6 +57,11 @@ class Expansion:
         """The radius of matrix k with the rest of every variable in it, (N, A, p, q)."""
         # a sum over at most 80 variables: 80 u < 90 u <= 1e-14
         return np.asarray((self.rad[k] + self.rest[k].sum(axis=0)) * (1 + 1e-14))
+
+    def balls(self) -> list[Balls]:
+        """The matrices as they are known at the vertices, with all that varies in their radii."""
+        parts = zip(self.mid, self.size, map(self.filled, range(len(self.mid))), strict=True)
+        return [Balls(mid, size, rad) for mid, size, rad in parts]
 
     def over_vertices(self, by_end: Array) -> Array:
         """What is known at the ends, (N, A, ...), at the vertices, (N, V, ...)."""
