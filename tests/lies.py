@@ -55,6 +55,7 @@ PROBLEMS: dict[str, tuple[TubeProblem, str]] = {
         two_state(values={"h": 0.9}, wind=wind("0.2"), residual=REST, predictor_gain=F(40)),
         "B",
     ),
+    "a wind alone": (two_state(wind=wind("0.05")), "B"),
     "a wind that nothing is left of": (two_state(wind=wind("0")), "AB"),
     "parameters that are unknown": (two_state(residual=REST), "B"),
 }

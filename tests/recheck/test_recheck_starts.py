@@ -12,7 +12,7 @@ from flint import ctx
 from rechecked import case_of, certified, examine, failing, sealed
 from systems import SMALL
 
-from tubecert.recheck.start import _delta, _Speed
+from tubecert.recheck.start import _delta, _segment, _Speed
 
 pytestmark = pytest.mark.slow
 FLAT = SMALL.replace("0.1*sin(t)", "0.1*cos(t)")
@@ -21,7 +21,7 @@ BENT = FLAT.replace('[[1, "-0.3"], ["-0.3", 2]]', '[["1 + 0.3*x", "0.2*x"], ["0.
 )
 START, TUBE, H = "{at: [0.05, 0]}", "tube: {epsilon: 0.2,", 'h: ["0.1*cos(t) + 0.05*x"]'
 WITHIN, BOX = (START, "{within: 0.03}"), (START, "{box: {x: [-0.02, 0.05], y: [0.01, 0.04]}}")
-COORDINATES = (TUBE, "tube: {coordinates: auto, epsilon: 0.2,")
+COORDINATES = (TUBE, "tube: {coordinates: [[3, 1], [0, 1]], epsilon: 0.2,")
 ADAPTED = ("adaptation:", 'disturbance: {E: [["0.1"], [1]], bound: 0.02, rate: 1}\nadaptation:')
 PARAMETER = (
     ("inputs: [u]", "inputs: [u]\n  parameters: {k: [0.2, 0.4]}"),
@@ -103,3 +103,6 @@ def test_a_segment_is_as_long_as_its_metric_makes_it(point, count):
         ends = [mpmath.mpf(end.str(40, radius=False)) for end in (low.lower(), high.upper())]
         assert ends[0] <= true <= ends[1]
         assert ends[1] - ends[0] <= true * (mpmath.mpf("0.2") if count > 1 else 1)
+        for factor, holds in (("0.999", False), ("1.001", True)):
+            limit = Fraction(str(true)) * Fraction(factor)
+            assert _segment(case.place, tuple(map(Fraction, point)), limit).holds == holds
