@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from rechecked import certified, examine, failing, sealed
+from rechecked import certified, examine, failing, respecified, sealed
 from systems import SMALL
 
 from tubecert.errors import TubecertError
@@ -287,3 +287,28 @@ def test_a_predictor_that_was_asked_for_is_the_one_that_is_proven(key, option):
         pair(r, key, predictor_gain=2, adaptation_rate=10**6)
 
     assert any("omega = " in name for name in failed(made, change))
+
+
+# -- inputs
+
+
+@pytest.mark.parametrize(("limits", "holds"), [((-1, 1), True), ((-0.2, 3), False), ((-3, 0.2), False)])
+def test_an_input_stays_within_both_of_its_limits(honest, limits, holds):
+    """Specification and entry agree; the bound lies within, or beyond one end."""
+    document = respecified(honest[0], lambda s: s["limits"].update(u=list(map(str, limits))))
+    document["result"]["inputs"][0]["limits"] = list(map(float, limits))
+    names = [name for name, _ in failing(examine(sealed(document), memory=dict(honest[1])))]
+    assert names == ([] if holds else ["the verdict follows from the sections"])
+
+
+def test_an_input_is_bounded_by_what_is_certified_alone():
+    made = examined(
+        SMALL.replace("0.1*sin(t)", "0.4*sin(t)") + "limits: {u: [-9, 9]}\n", conditions="distance"
+    )
+    assert ALONE not in made[0]["result"]["inputs"][0]["bounds"]
+
+    def change(r: Result) -> None:
+        bounds = r["inputs"][0]["bounds"]
+        bounds[ALONE] = {"least": -8.0, "greatest": 8.0, "feedback": 7.0, "adaptation": 0.0}
+
+    assert "the verdict follows from the sections" in failed(made, change)

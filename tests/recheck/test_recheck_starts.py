@@ -21,7 +21,10 @@ BENT = FLAT.replace('[[1, "-0.3"], ["-0.3", 2]]', '[["1 + 0.3*x", "0.2*x"], ["0.
 )
 START, TUBE, H = "{at: [0.05, 0]}", "tube: {epsilon: 0.2,", 'h: ["0.1*cos(t) + 0.05*x"]'
 WITHIN, BOX = (START, "{within: 0.03}"), (START, "{box: {x: [-0.02, 0.05], y: [0.01, 0.04]}}")
-COORDINATES = (TUBE, "tube: {coordinates: [[3, 1], [0, 1]], epsilon: 0.2,")
+COORDINATES = (  # that stretch what is measured of a start
+    (TUBE, "tube: {coordinates: auto, epsilon: 0.2,"),
+    ('[[1, "-0.3"], ["-0.3", 2]]', '[["1/9", "-0.03"], ["-0.03", 2]]'),
+)
 ADAPTED = ("adaptation:", 'disturbance: {E: [["0.1"], [1]], bound: 0.02, rate: 1}\nadaptation:')
 PARAMETER = (
     ("inputs: [u]", "inputs: [u]\n  parameters: {k: [0.2, 0.4]}"),
@@ -33,10 +36,10 @@ STARTS: dict[str, tuple[str, list[tuple[str, str]]]] = {
     "a point of a metric that is not constant": (BENT, []),
     "a radius": (FLAT, [WITHIN]),
     "a radius of a metric that is not constant": (BENT, [WITHIN]),
-    "a radius in coordinates": (FLAT, [WITHIN, COORDINATES]),
+    "a radius in coordinates": (FLAT, [WITHIN, *COORDINATES]),
     "a box": (FLAT, [BOX]),
     "a box of a metric that is not constant": (BENT, [BOX]),
-    "a box in coordinates": (FLAT, [BOX, COORDINATES]),
+    "a box in coordinates": (FLAT, [BOX, *COORDINATES]),
     "an h with a bound": (FLAT, [(H, "bounds: {h: 0.12, h_x: 0.05, h_t: 0.1}")]),
     "an h with a bound beside": (FLAT, [(H, H + ", bounds: {h: 0.12}")]),
     "a wind that is adapted to": (FLAT, [ADAPTED]),
