@@ -21,7 +21,6 @@ def test_the_honest_one_is_confirmed(honest):
     result = honest["result"]
     assert result["verdict"] == "certified"
     assert {"x", "y", "s"} == result["tube"]["half_widths"].keys()
-    assert result["distance"]["curve"]
     assert failing(examine(honest)) == []
 
 
@@ -84,7 +83,6 @@ FORGED = {
     "a margin": put([0.5, None], *PAIR, "margin"),
     "a smaller radius for ever": scaled(0.9, (*PAIR, "ultimate_radius"), ("distance", "ultimate_radius")),
     "another radius for ever": scaled(0.9, ("distance", "ultimate_radius")),
-    "a point of the curve that serves nothing": scaled(0.5, ("distance", "curve", 0, "adaptation_rate")),
     "half-widths of the states": scaled(0.97, ("tube", "half_widths", "x")),
     "half-width of an output": scaled(0.97, ("tube", "half_widths", "s")),
     "an output without a half-width": gone("tube", "half_widths", "s"),

@@ -109,21 +109,6 @@ OF_A: dict[str, tuple[Change, str]] = {
     "predictor of the recipe": (lambda r: times(r["proof"][A], "predictor_gain", 2), "A: its recipe"),
     "recipe": (lambda r: r["proof"][A].update(bandwidth=4.0), "A: its recipe"),
     "ultimate radius": (lambda r: times(r[A], "ultimate_radius", 1 - 1e-6), "A: ultimate radius"),
-    "curve": (lambda r: times(r[A]["curve"][-1], "adaptation_rate", 0.9), "A: the curve"),
-    "curve at a bandwidth": (lambda r: times(r[A]["curve"][0], "bandwidth", 0.9), "A: the curve"),
-    "curve at another gain": (lambda r: times(r[A]["curve"][3], "predictor_gain", -1), "A: the curve"),
-    **{
-        f"{claim} around": (
-            lambda r, claim=claim: more(r[A]["margins_around"][claim], -1),
-            "A: margins around",
-        )
-        for claim in ("26a", "26b", "26c")
-    },
-    "rate around": (
-        lambda r: times(r[A]["margins_around"], "adaptation_rate", 0.5),
-        "A: margins around",
-    ),
-    "predictor around": (lambda r: times(r[A]["margins_around"], "predictor_gain", 0.5), "A: margins around"),
 }
 DERIVED = (
     *("speed", "uncertainty_rate", "prediction_error", "filter_error", "theta", "geodesic_rate", "Psi_rate"),
@@ -159,10 +144,6 @@ OF_B: dict[str, tuple[Change, str]] = {
         lambda r: r[B]["least_adaptation"].update(ultimate_radius=None),
         "B: ultimate radius",
     ),
-    "curve": (lambda r: times(r[B]["curve"][-1], "adaptation_rate", 0.9), "B: the curve"),
-    "curve at another gain": (lambda r: times(r[B]["curve"][3], "predictor_gain", -1), "B: the curve"),
-    "around": (lambda r: more(r[B]["margins_around"]["margin"], -1), "B: margins around"),
-    "rate around": (lambda r: times(r[B]["margins_around"], "adaptation_rate", 0.9), "B: margins around"),
 }
 
 
@@ -200,8 +181,6 @@ WEAKER: dict[str, Change] = {
     "distance": lambda r: times(r[ALONE]["distance"], 1, 1.1),
     "radii": lambda r: [times(r[key], "ultimate_radius", 1.1) for key in (ALONE, A, B)],
     "largest h": lambda r: times(r[ALONE], "uncertainty_limit", 0.9),
-    "curves": lambda r: [times(r[key]["curve"][-1], "adaptation_rate", 2) for key in (A, B)],
-    "around": lambda r: more(r[B]["margins_around"]["margin"], -1, -0.1),
     "derived": lambda r: times(r["constants"]["theta"], "above", 2),
 }
 
