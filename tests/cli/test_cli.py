@@ -157,7 +157,7 @@ def test_a_certificate_is_written_and_reported(folder, proven):
     [file] = folder.iterdir()
     assert file.name == "three_state.certificate.json"
     certificate = json.loads(file.read_text(encoding="utf-8"))
-    assert set(certificate) == {"format", "hash", "notes", "result", "run"}
+    assert set(certificate) == {"format", "hash", "result", "notes", "run"}
     assert certificate["hash"] == digest(certificate["result"])
     assert certificate["run"]["versions"]["tubecert"] == __version__
 

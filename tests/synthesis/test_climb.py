@@ -14,7 +14,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from tubecert import pipeline
-from tubecert.certificate.searched import MetricRow, SynthesisData
+from tubecert.certificate.searched import MetricRow, SearchData
 from tubecert.claims.advice import ConstantInputs
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.tube import TubeInSafeSet
@@ -213,8 +213,7 @@ def test_metrics_of_one_rate_are_told_apart_by_their_degree():
     row = MetricRow(rate=Fraction(1), floor="identity", degree=0, condition_number=2.0)
     said = []
     for degree in (0, 2):
-        found = SynthesisData(
-            asked=None,
+        found = SearchData(
             objective="adaptation",
             verdict=Verdict.UNDECIDED,
             attempts=(),
