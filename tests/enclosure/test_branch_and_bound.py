@@ -126,6 +126,23 @@ def test_the_witness_lies_in_the_domain_and_attains_the_value(name):
         assert distance <= 0.25
 
 
+@pytest.mark.parametrize(
+    ("text", "ranges"),
+    [("x**2 - x**4 + y", {"x": (-1, 1), "y": (0, 1)}), ("x*y - x**2 - y**4", {"x": (-1, 1), "y": (-1, 1)})],
+    ids=["mirror images", "central images"],
+)
+def test_where_a_value_is_found_does_not_hang_on_the_last_digits_of_values(text, ranges, monkeypatch):
+    objective, domain = scalar(read(text)), box(**ranges)
+    lower = objective.lower
+    places = set()
+    for seed in range(6):
+        last = np.random.default_rng(seed)
+        noisy = lambda lo, hi, last=last: lower(lo, hi) * (1 - 1e-15 * last.integers(0, 9, len(lo)))  # noqa: E731
+        monkeypatch.setattr(objective, "lower", noisy)
+        places.add(tuple(supremum(objective, domain, Effort(gap=1e-2)).at.values()))
+    assert len(places) == 1
+
+
 @pytest.mark.parametrize("name", ["wave", "quadratic on a ball", "norm on a tube", "ripple", "difference"])
 @pytest.mark.parametrize("budget", [1, 50])
 def test_an_exhausted_budget_is_reported_and_the_bounds_still_hold(name, budget):

@@ -240,6 +240,16 @@ def test_squares_that_overflow_leave_nothing_known_but_nothing_false():
     assert column.hi[0] >= 1.1e200
 
 
+@pytest.mark.parametrize("scales", [(1e-9, 1, 1e9), (1e12, 1e-6, 3)])
+def test_whitening_does_not_depend_on_units(scales):
+    """Where these are far apart, the smallest eigenvalue is lost in the rounding errors of the largest."""
+    plain = np.array([[2, 0.9, 0.3], [0.9, 1, -0.4], [0.3, -0.4, 1.5]])
+    units = np.array(scales)
+    s = plain * units * units[:, None]
+    t = whitening(s[None])[0]
+    assert np.abs(t @ s @ t.T - np.eye(3)).max() < 1e-12
+
+
 def test_whitening_turns_a_matrix_into_nearly_the_identity_or_gives_up():
     s = symmetric(3, "plain", 3)
     s = s @ s.T + np.eye(3)
