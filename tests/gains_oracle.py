@@ -255,12 +255,7 @@ def needed(n: Given, recipe: Any, Y: mpf) -> tuple[mpf, mpf]:
     c, root = n.c, mpmath.sqrt
     w, Gamma, g, R = (
         number(x)
-        for x in (
-            recipe.bandwidth,
-            recipe.adaptation_rate,
-            recipe.predictor_gain,
-            recipe.projection_radius,
-        )
+        for x in (recipe.bandwidth, recipe.adaptation_rate, recipe.predictor_gain, recipe.projection_radius)
     )
     _, blown, taken = n.wind
     s1, q, both = c["h_t"] + c["h_x"] * Y, 2 * g, c["h"] + R
@@ -302,10 +297,7 @@ def distance(n: Given, recipe: DistanceRecipe) -> dict[str, mpf]:
     least_S, least_e = needed(n, recipe, Y)
     if least_S > S or e < least_e:
         return {}
-    return {
-        "Y": Y / speed(n, recipe, S, e) - 1,
-        "distance": 1 - course(n, recipe, S, e).supremum() / n.dbar,
-    }
+    return {"Y": Y / speed(n, recipe, S, e) - 1, "distance": 1 - course(n, recipe, S, e).supremum() / n.dbar}
 
 
 def best(problem: TubeProblem, recipe: Any) -> mpf:

@@ -51,10 +51,7 @@ PROBLEMS: dict[str, tuple[TubeProblem, str]] = {
     "a plan that ends": (two_state(horizon=F(3)), "AB"),
     "B turns": (two_state(values=TURNING), "AB"),
     "a wind, B turns": (two_state(values=TURNING, wind=wind("0.05"), residual=REST), "B"),
-    "a wind": (
-        two_state(values={"h": 0.9}, wind=wind("0.2"), residual=REST, predictor_gain=F(40)),
-        "B",
-    ),
+    "a wind": (two_state(values={"h": 0.9}, wind=wind("0.2"), residual=REST, predictor_gain=F(40)), "B"),
     "a wind alone": (two_state(wind=wind("0.05")), "B"),
     "a wind that nothing is left of": (two_state(wind=wind("0")), "AB"),
     "parameters that are unknown": (two_state(residual=REST), "B"),

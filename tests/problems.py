@@ -48,28 +48,14 @@ def constants(**values: float | tuple[float, float]) -> BoundConstants:
 def two_state(**options: Any) -> TubeProblem:
     """The function-level row of the two-state system, eps = .6, rho_a = .1."""
     values = {
-        "lower": 0.20086,
-        "upper": 0.32823,
-        "f": 19.87,
-        "f_x": 60.0,
-        "B": float(np.hypot(0.5, 2.0)),
-        "B_pinv": float(1 / np.hypot(0.5, 2.0)),
-        "u_star": 3.03,
-        "h": 2.511177,
-        "h_x": 0.1,
-        "h_t": 4.0,
-        "feedback_gain": 6.29599,
-        "metric_input_gain": 1.03048,
-        "drift_on_plan": 19.4787,
-    } | options.pop("values", {})
+        "lower": 0.20086, "upper": 0.32823, "f": 19.87, "f_x": 60.0, "B": float(np.hypot(0.5, 2.0)),
+        "B_pinv": float(1 / np.hypot(0.5, 2.0)), "u_star": 3.03, "h": 2.511177, "h_x": 0.1, "h_t": 4.0,
+        "feedback_gain": 6.29599, "metric_input_gain": 1.03048, "drift_on_plan": 19.4787,
+    } | options.pop("values", {})  # fmt: skip
     defaults = {
-        "rate": Fraction("1.74"),
-        "epsilon": Fraction("0.6"),
-        "rho_a": Fraction("0.1"),
-        "rho_r": Fraction("0.6"),
-        "rho": Fraction("0.7"),
-        "states": 2,
-    }
+        "rate": Fraction("1.74"), "epsilon": Fraction("0.6"), "rho_a": Fraction("0.1"),
+        "rho_r": Fraction("0.6"), "rho": Fraction("0.7"), "states": 2,
+    }  # fmt: skip
     return TubeProblem(constants=constants(**values), **(defaults | options))
 
 
@@ -120,54 +106,28 @@ def three_state(**options: Any) -> TubeProblem:
         "initial_distance": _segment_length(X0),
     } | options.pop("values", {})
     defaults = {
-        "rate": Fraction("0.9999"),
-        "epsilon": Fraction("0.01"),
-        "rho_a": Fraction("0.01"),
-        "rho_r": Fraction(rho_r),
-        "rho": Fraction(rho * (1 + 1e-12)),
-        "states": 3,
-    }
+        "rate": Fraction("0.9999"), "epsilon": Fraction("0.01"), "rho_a": Fraction("0.01"),
+        "rho_r": Fraction(rho_r), "rho": Fraction(rho * (1 + 1e-12)), "states": 3,
+    }  # fmt: skip
     return TubeProblem(constants=constants(**values), **(defaults | options))
 
 
-# every term of every formula is alive
+# every term of every formula is alive; the start is far enough off for sup D to be an interior maximum
 ALIVE = {
-    "lower": 0.9,
-    "upper": 1.7,
-    "f": 3.1,
-    "f_x": 2.3,
-    "B": 1.2,
-    "B_x": 0.15,
-    "b_x": 0.11,
-    "B_pinv": 1.1,
-    "B_pinv_x": 0.13,
-    "M_x": 0.21,
-    "u_star": 0.8,
-    "h": 0.35,
-    "h_x": 0.06,
-    "h_t": 0.9,
-    "h_initial": 0.3,
-    "feedback_gain": 1.3,
-    "metric_input_gain": 1.4,
-    "drift_on_plan": 2.9,
-    "initial_distance": 0.45,  # large enough for sup D to be an interior maximum
-    "plan_defect": 0.02,
-    "plan_defect_metric": 0.02,
-}
+    "lower": 0.9, "upper": 1.7, "f": 3.1, "f_x": 2.3, "B": 1.2, "B_x": 0.15, "b_x": 0.11, "B_pinv": 1.1,
+    "B_pinv_x": 0.13, "M_x": 0.21, "u_star": 0.8, "h": 0.35, "h_x": 0.06, "h_t": 0.9, "h_initial": 0.3,
+    "feedback_gain": 1.3, "metric_input_gain": 1.4, "drift_on_plan": 2.9, "initial_distance": 0.45,
+    "plan_defect": 0.02, "plan_defect_metric": 0.02,
+}  # fmt: skip
 
 
 def alive(**options) -> TubeProblem:
     """A synthetic problem in which every constant matters."""
     values = ALIVE | options.pop("values", {})
     defaults = {
-        "rate": Fraction("1.3"),
-        "epsilon": Fraction("0.5"),
-        "rho_a": Fraction("0.2"),
-        "rho_r": Fraction("0.7"),
-        "rho": Fraction("0.9"),
-        "predictor_gain": Fraction("3.5"),
-        "states": 2,
-    }
+        "rate": Fraction("1.3"), "epsilon": Fraction("0.5"), "rho_a": Fraction("0.2"),
+        "rho_r": Fraction("0.7"), "rho": Fraction("0.9"), "predictor_gain": Fraction("3.5"), "states": 2,
+    }  # fmt: skip
     return TubeProblem(constants=constants(**values), **(defaults | options))
 
 

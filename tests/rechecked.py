@@ -11,6 +11,7 @@ from typing import Any
 
 import proven
 
+from tubecert import certificate
 from tubecert.errors import TubecertError
 from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
@@ -35,6 +36,11 @@ def certified(text: str, *, bare: bool = True, **options: object) -> Document:
 def shipped(name: str) -> Document:
     """The certificate of a shipped configuration, as users have it."""
     return proven.shipped(name, conditions="all")
+
+
+def written(result: Any) -> Document:
+    """A result as the certificate that a reader finds."""
+    return json.loads(certificate.dump(certificate.seal(result, {})))
 
 
 def digest(data: object) -> str:

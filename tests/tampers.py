@@ -7,12 +7,13 @@ examined and true, and weaker (the safe direction is checked here, without the c
 from __future__ import annotations
 
 import copy
-import hashlib
 import json
 import pickle
 import random
 import re
 from collections import defaultdict
+
+from rechecked import digest
 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.recheck.run import recheck
@@ -183,25 +184,19 @@ def _other_text(random_, value):
 def applied(certificate, path, kind, value):
     """A copy with one field changed and the hash recomputed."""
     result = pickle.loads(pickle.dumps(certificate["result"]))
-    holder = result
-    for key in path[:-1]:
-        holder = holder[key]
+    holder = value_at(result, path[:-1])
     if kind == "removed":
         del holder[path[-1]]
     else:
         holder[path[-1]] = value
-    text = json.dumps(result, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    digest = "sha256:" + hashlib.sha256(text.encode()).hexdigest()
-    return {**certificate, "hash": digest, "result": result}
+    return {**certificate, "hash": digest(result), "result": result}
 
 
 def between_ends(result, path, new):
     """A bound of an enclosure moved inside it: the other end, which is attained, says that it may still be true."""
     *above, last = path
     other = {0: 1, 1: 0, "above": "below", "below": "above"}.get(last)
-    holder = result
-    for key in above:
-        holder = holder[key]
+    holder = value_at(result, above)
     if other is None or not number(new):
         return False
     end = holder[other]
@@ -259,9 +254,7 @@ def campaign(certificate, count, seed, report=None):
                 f"{done} changes: {refused} refused, {sum(accepted.values())} harmless, {len(wrong)} wrong {wrong[-3:]}"
             )
         path = random_.choice(shapes[random_.choice(names)])
-        old = certificate["result"]
-        for key in path:
-            old = old[key]
+        old = value_at(certificate["result"], path)
         kind, new = changed(random_, old)
         if kind == "changed" and type(new) is type(old) and new == old:
             continue
@@ -279,43 +272,13 @@ def campaign(certificate, count, seed, report=None):
 # -- changes of structure: keys removed, added, renamed, moved; types; extreme numbers; names of other kinds
 
 STRUCTURES = (
-    "removed",
-    "added",
-    "renamed",
-    "moved",
-    "swapped",
-    "retyped",
-    "wrapped",
-    "listed",
-    "extreme",
-    "named",
-)
+    "removed", "added", "renamed", "moved", "swapped", "retyped", "wrapped", "listed", "extreme", "named",
+)  # fmt: skip
 EXTREME = [
-    "1e-999999999",
-    "1e999999999",
-    "1e308",
-    "-1e308",
-    "5e-324",
-    "-0.0",
-    "9" * 4000,
-    "0." + "3" * 4000,
-    "0.1000000000000000055511151231257827",
-    "1E400",
-    "00",
-    "1.",
-    '"1e-999999999"',
-    '"9**9**9"',
-    '"12**12**12"',
-    f'"{"9" * 4000}"',
-    '"1/0"',
-    '"nan"',
-    '"Infinity"',
-    '"\\u0661"',
-    '"1_0"',
-    '"0x10"',
-    "NaN",
-    "-Infinity",
-]
+    "1e-999999999", "1e999999999", "1e308", "-1e308", "5e-324", "-0.0", "9" * 4000, "0." + "3" * 4000,
+    "0.1000000000000000055511151231257827", "1E400", "00", "1.", '"1e-999999999"', '"9**9**9"', '"12**12**12"',
+    f'"{"9" * 4000}"', '"1/0"', '"nan"', '"Infinity"', '"\\u0661"', '"1_0"', '"0x10"', "NaN", "-Infinity",
+]  # fmt: skip
 BAD_NAMES = ("pi", "t", "True", "None", "sin", "abs", "lambda", "e 1", "1e5", "", "x*", "\u03c0", "mu#", "s#")
 
 # members that may be there or not, wherever they come from: they make no claim, or are examined as they stand
@@ -471,14 +434,9 @@ def resealed(certificate, result, random_):
     """The text of a certificate with both hashes made right."""
     inner = result.get("spec") if isinstance(result, dict) else None
     if isinstance(inner, dict) and isinstance(inner.get("effective_hash"), str) and "effective" in inner:
-        inner["effective_hash"] = _hash(inner["effective"])
-    text = json.dumps({**certificate, "hash": _hash(result), "result": result})
+        inner["effective_hash"] = digest(inner["effective"])
+    text = json.dumps({**certificate, "hash": digest(result), "result": result})
     return text.replace('"@extreme@"', random_.choice(EXTREME))
-
-
-def _hash(data):
-    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return "sha256:" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def structural_campaign(certificate, count, seed, report=None):

@@ -134,13 +134,9 @@ def test_absurd_numbers_are_refused_at_once():
 
 
 FAMILIES = {
-    "claim": Claim,
-    "failure": Failure,
-    "relax": Relax,
-    "plan_remedy": PlanRemedy,
-    "assumption": Assumption,
+    "claim": Claim, "failure": Failure, "relax": Relax, "plan_remedy": PlanRemedy, "assumption": Assumption,
     "outcome": Outcome,
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FAMILIES)

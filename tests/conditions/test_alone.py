@@ -39,16 +39,6 @@ def section(of):
     return Alone().section(of, PROPOSERS[NoGains].propose(of, Asked()))
 
 
-def test_the_bound_is_that_of_the_closed_form():
-    # dbar = 2; A1 = (2 * .3 + .12)/1.5 = .48
-    found = section(problem(plan_defect_metric=0.12))
-    assert found.verdict is Verdict.CERTIFIED
-    assert found.distance.above == pytest.approx(0.48, rel=1e-11)
-    assert found.distance.above >= 0.48 * LESS
-    assert float(found.decisive.margins["no_adaptation"].lo) == pytest.approx(1 - 0.48 / 2, rel=1e-12)
-    assert found.judgement.ultimate_radius == pytest.approx(0.24, rel=1e-12)
-
-
 @pytest.mark.slow
 @given(st.floats(0, 1.9), st.floats(0, 2), st.floats(0, 1), st.floats(0.01, 20), st.booleans())
 def test_it_is_above_the_solution_of_the_comparison_equation(d0, h, delta, T, endless):
@@ -95,11 +85,6 @@ def test_what_the_enclosures_leave_open_is_undecided_and_what_they_exclude_refut
     assert section(problem(h=(1.4, 1.6))).verdict is Verdict.UNDECIDED
     assert section(problem(h=(1.51, 1.6))).verdict is Verdict.REFUTED
     assert section(problem(h=(1.4, 1.49))).verdict is Verdict.CERTIFIED
-
-
-def test_it_needs_no_gain_and_no_predictor():
-    needs = Alone().theorem.needs(problem())
-    assert needs == {"lower", "metric_input_gain", "h", "initial_distance", "plan_defect_metric"}
 
 
 def test_the_limit_of_h_is_absent_where_h_does_not_act():

@@ -125,6 +125,7 @@ def test_a_recipe_of_another_kind_proves_nothing(kind):
         )
         assert (judgement.verdict is Verdict.CERTIFIED) == (kind == other)
         assert bool(judgement.beside) == bool(judgement.curve) == (kind == other)
+        assert judge(problem, theorem, Proposal(hopeless=recipe)).verdict is Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize("kind", KINDS)

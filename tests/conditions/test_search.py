@@ -18,7 +18,6 @@ from problems import (
     two_state,
     verdict_at,
 )
-from test_conditions import scaled
 
 from tubecert.conditions import distance as theorem_b
 from tubecert.conditions.distance import DistanceRecipe
@@ -103,12 +102,6 @@ def test_a_constant_reduced_by_two_per_cent_changes_the_printed_gains(name):
     values = ALIVE | ELSEWHERE.get(name, {})
     base = printed_gains(alive(values=values)) if name in ELSEWHERE else PINNED
     assert printed_gains(alive(values=values | {name: values[name] * 0.98})) != base
-
-
-@pytest.mark.parametrize("c", [0.01, 0.1, 10.0, 100.0])
-def test_gains_do_not_depend_on_the_scale_of_the_metric(c):
-    expected = [float(x) for x in PINNED]
-    assert [float(x) for x in printed_gains(alive(values=scaled(c)))] == pytest.approx(expected, rel=2e-3)
 
 
 # --- certificate A against grids
@@ -370,12 +363,8 @@ def test_results_are_json_and_recipes_are_decimals():
     recipe = to_json(judged_distance(alive()).least_adaptation.recipe)
     again = theorem_b.DistanceRecipe(**{k: Fraction(repr(x)) for k, x in recipe.items()})
     assert margin_distance(alive(), again).lo > 0
-
-
-def test_recipes_as_printed_decimals_are_what_is_verified():
     recipe = judged_26(two_state(predictor_gain=None)).pair.recipe
-    again = RateRecipe(**{k: Fraction(repr(x)) for k, x in to_json(recipe).items()})
-    assert again == recipe
+    assert RateRecipe(**{k: Fraction(repr(x)) for k, x in to_json(recipe).items()}) == recipe
 
 
 def test_elasticities_are_the_slopes_of_the_search():

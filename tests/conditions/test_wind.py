@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from problems import (
-    alive,
-    judged_26,
-    judged_distance,
-    margin_distance,
-    two_state,
-)
+from problems import alive, judged_26, judged_distance, two_state
 
 from tubecert.bounds.constants import Constant, ResidualConstants, WindConstants
-from tubecert.conditions import alone, distance
+from tubecert.conditions import distance
 from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.conditions.proposal import Asked
 from tubecert.conditions.wind import prediction
-from tubecert.kernel import check
 from tubecert.kinds.table import KINDS
-from tubecert.search.distance import least_rate, recipe_at
+from tubecert.search.distance import least_rate
 from tubecert.search.proposers import PROPOSERS
 from tubecert.verdict import Verdict
 
@@ -52,44 +44,7 @@ def curved(**options) -> TubeProblem:
 # -- without wind
 
 
-@pytest.mark.parametrize("make", [alive, two_state, curved])
-def test_a_wind_of_no_size_changes_nothing(make):
-    bare, still = make(), make(wind=wind("0"), residual=rest(0.0, 0.0))
-    one = Fraction(50)
-    for problem in (bare, still):
-        assert alone.distance(problem).hi == alone.distance(bare).hi
-    first = recipe_at(bare, one, 10**6 * one, bare.predictor_gain or one)
-    second = recipe_at(still, one, 10**6 * one, still.predictor_gain or one)
-    assert float(second.prediction_error) == pytest.approx(float(first.prediction_error), rel=1e-9)
-    assert margin_distance(still, second).lo == pytest.approx(margin_distance(bare, first).lo, rel=1e-9)
-
-
-def test_without_wind_there_are_no_numbers_of_it():
-    n = two_state().proven()
-    assert n.wind_push is n.wind_speed is n.wind_error is n.wind_matched is n.rest_speed is None
-
-
 # -- what is added to delta and phi
-
-
-def test_a_wind_adds_its_push_to_the_defect_in_certificate_0():
-    values = {"plan_defect_metric": 0.1 + 0.7 * 0.05}
-    pushed, moved = two_state(values={"plan_defect_metric": 0.1}, wind=wind("0.05")), two_state(values=values)
-    assert alone.distance(pushed).hi == pytest.approx(alone.distance(moved).hi, rel=1e-12)
-    assert alone.uncertainty_limit(pushed) == pytest.approx(alone.uncertainty_limit(moved), rel=1e-12)
-
-
-def test_what_parameters_leave_is_a_part_of_delta_and_phi():
-    n = two_state(values={"plan_defect_metric": 0.1}, residual=rest(0.2, 0.3)).proven()
-    assert n.delta.hi == pytest.approx(0.3)
-    assert n.phi.hi == pytest.approx(19.4787 + 0.3)
-    assert n.delta.hi >= 0.1 + 0.2
-
-
-def test_the_speed_of_the_wind_enters_y():
-    still, blown = two_state(), two_state(wind=wind("0.5"))
-    a, b = (distance.drift_bound(problem.proven()).hi for problem in (still, blown))
-    assert b - a == pytest.approx(0.9 * 0.5)
 
 
 # -- the estimate of B
@@ -125,17 +80,6 @@ def test_the_bound_of_the_prediction_is_attained():
     assert -q * y**2 + 2 * zb * y + 2 * hs * s1 / Gamma == pytest.approx(0, abs=1e-9)
 
 
-def test_an_unmatched_wind_costs_the_estimate_of_b_nothing_if_b_is_constant():
-    still, blown = two_state(), two_state(wind=wind("0.3", explained=0.0))
-    one, rate = Fraction(50), Fraction(10**6)
-    e = [float(recipe_at(p, one, rate, one).prediction_error) for p in (still, blown)]
-    Y = [float(recipe_at(p, one, rate, one).speed) for p in (still, blown)]
-    assert Y[1] > Y[0]
-    assert e[1] == pytest.approx(e[0], rel=0.01)  # through Y alone
-    turning = curved(wind=wind("0.3", explained=0.0))
-    assert float(recipe_at(turning, one, rate, one).prediction_error) > 1.5 * e[0]
-
-
 @pytest.mark.parametrize(
     "problem", [two_state(wind=wind("0.02")), curved(wind=wind("0.02")), two_state(residual=rest(0.01, 0.02))]
 )
@@ -147,16 +91,6 @@ def test_the_least_rate_is_one_at_which_e_is_what_it_has_to_be(problem):
     needed = distance.error_needed(n, Y, omega, Predictor.of_gain(omega, omega), Gamma)
     assert np.isfinite(Gamma[0])
     assert needed[0] == pytest.approx(e[0], rel=1e-9)
-
-
-def test_adaptation_cannot_make_up_for_what_the_estimate_takes_for_wind():
-    """e >= eps_w |w| whatever Gamma: a recipe that claims less is none."""
-    problem = two_state(wind=wind("0.02"))
-    honest = recipe_at(problem, Fraction(60), Fraction(10) ** 30, Fraction(60))
-    assert float(honest.prediction_error) >= 0.4 * 0.02
-    assert check(problem, honest).margins["distance"].lo > -np.inf
-    liar = replace(honest, prediction_error=Fraction(4, 1000))
-    assert check(problem, liar).margins["distance"].lo == -np.inf
 
 
 # -- verdicts

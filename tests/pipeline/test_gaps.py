@@ -28,13 +28,7 @@ def tube_of(name: str, kind: str, **options):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "kind"),
-    [
-        ("three_state", "A"),
-        ("state_dependent_input", "B"),
-    ],
-)
+@pytest.mark.parametrize(("name", "kind"), [("three_state", "A"), ("state_dependent_input", "B")])
 def test_gains_are_those_of_close_constants(name, kind):
     by_effect = enclosed(tube_of(name, kind, by_effect=True))
     close = enclose(tube_of(name, kind, gap=CLOSE))

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from proven import barely as in_brief
-from rechecked import certified, examine, failing, respecified, sealed
+from rechecked import certified, examine, failing, respecified, sealed, unconfirmed
 
-from tubecert.errors import ExitCode, TubecertError
 from tubecert.pipeline import Options, certify
 from tubecert.pipeline.width import measure_in
 from tubecert.simulate.certified import read_numbers
@@ -78,7 +77,7 @@ def test_recheck_confirms_half_widths_of_outputs_and_catches_what_is_wrong_with_
     names = [claim.name for claim in found.claims]
     assert (
         sum(
-            name.startswith(("half-width of m ", "half-width of tip ", "half-width of twice "))
+            name.startswith(tuple(f"half-width of {each} " for each in ("m", "tip", "twice")))
             for name in names
         )
         == 3
@@ -87,38 +86,30 @@ def test_recheck_confirms_half_widths_of_outputs_and_catches_what_is_wrong_with_
         narrow = sealed(document)
         narrow["result"]["tube"]["half_widths"][name] *= 0.97
         assert any(claim.startswith(f"half-width of {name}") for claim, _ in failing(examine(sealed(narrow))))
+        del narrow["result"]["tube"]["half_widths"][name]
+        assert unconfirmed(narrow)
 
 
-def changes():
-    return {
-        "another combination": lambda outputs: outputs | {"tip": "x - 0.7*y"},
-        "one more": lambda outputs: outputs | {"more": "y"},
-        "one less": lambda outputs: {name: e for name, e in outputs.items() if name != "m"},
-        "a square": lambda outputs: outputs | {"m": "x*y"},
-        "a constant": lambda outputs: outputs | {"m": "x + 1"},
-        "nothing": lambda outputs: outputs | {"m": "x - x"},
-        "a debt": lambda outputs: outputs | {"m": "x + 0/y"},
-        "a name of a state": lambda outputs: outputs | {"x": "y"},
-        "a name of a function": lambda outputs: outputs | {"sin": "y"},
-    }
-
-
-def refused(document):
-    try:
-        examine(document)
-    except TubecertError as error:
-        return error.exit_code == ExitCode.INVALID
-    return False
+CHANGES = {
+    "another combination": lambda outputs: outputs | {"tip": "x - 0.7*y"},
+    "one more": lambda outputs: outputs | {"more": "y"},
+    "one less": lambda outputs: {name: e for name, e in outputs.items() if name != "m"},
+    "a square": lambda outputs: outputs | {"m": "x*y"},
+    "a constant": lambda outputs: outputs | {"m": "x + 1"},
+    "nothing": lambda outputs: outputs | {"m": "x - x"},
+    "a debt": lambda outputs: outputs | {"m": "x + 0/y"},
+    "a name of a state": lambda outputs: outputs | {"x": "y"},
+    "a name of a function": lambda outputs: outputs | {"sin": "y"},
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("change", changes().values(), ids=changes().keys())
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES.keys())
 def test_other_outputs_are_noticed(change):
     def other(effective):
         effective["system"]["outputs"] = change(effective["system"]["outputs"])
 
-    forged = respecified(made(), other)
-    assert refused(forged) or failing(examine(forged))
+    assert unconfirmed(respecified(made(), other))
 
 
 @pytest.mark.slow

@@ -71,16 +71,6 @@ def test_what_is_certified_of_a_lie_is_confirmed(case):
         assert found.verdict == "confirmed", found.failing
 
 
-def test_a_proposal_of_another_kind_is_none(case):
-    kind, made, honest = case
-    stranger = KINDS["A" if kind == "B" else "B"]
-    found = judge_all(made, {stranger: honest})
-    assert found.verdict is Verdict.UNDECIDED
-    other = PROPOSERS[stranger].propose(made.problem, Asked(curve=False)).decisive
-    found = judge_all(made, {KINDS[kind]: replace(honest, decisive=other)})
-    assert found.verdict is Verdict.UNDECIDED
-
-
 @pytest.mark.parametrize("kind", DECIDING)
 @pytest.mark.parametrize("place", ["decisive", "hopeless"])
 def test_other_gains_than_were_asked_for_are_no_answer(kind, place):

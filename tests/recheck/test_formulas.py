@@ -11,43 +11,35 @@ import ast
 import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import replace
 from fractions import Fraction
 from types import CodeType, FunctionType, ModuleType
 
 import numpy as np
 import pytest
 from flint import arb, ctx
+from lies import exactly
 from problems import ALIVE, alive
-from rechecked import case_of, certified
-from systems import SMALL
+from test_recheck_formulas import gains_of, proof_of, reading
 
 from tubecert.bounds.constants import ResidualConstants, WindConstants
 from tubecert.conditions import alone, derived, distance, obstacles, predictor, rates, wind
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.conditions.rates import RateRecipe
-from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Interval
 from tubecert.recheck import conditions, filtering
 from tubecert.recheck import predictor as own_predictor
 from tubecert.recheck.balls import exact
-from tubecert.recheck.conditions import DistanceProof, Numbers, Setting, WindNumbers
 from tubecert.recheck.kinds import alone as own_alone
-from tubecert.recheck.predictor import Gains
 from tubecert.search.distance import recipe_at
 
 F = Fraction
-GAINS = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
 WIND = ("push", "size", "explained")
 LESS = F(999, 1000)
 LIES = ("speed", "prediction_error", "uncertainty", "projection_radius")
 Point = tuple[TubeProblem, RateRecipe, DistanceRecipe]
 Told = dict[str, tuple[float, float]]
-
-
-def known(value: float) -> Constant:
-    return Constant(below=value, above=value)
 
 
 def drawn(rng: np.random.Generator) -> Point:
@@ -59,8 +51,8 @@ def drawn(rng: np.random.Generator) -> Point:
     if rng.random() < 0.5:
         values |= {"B_x": 0.0, "B_pinv_x": 0.0, "b_x": 0.0}
     blown, moved = rng.random() < 0.5, rng.random() < 0.5
-    gust = WindConstants(**{name: known(float(rng.uniform(0.2, 2))) for name in WIND})
-    rest = ResidualConstants(**{name: known(float(rng.uniform(0.01, 0.1))) for name in ("push", "size")})
+    gust = WindConstants(**{name: exactly(float(rng.uniform(0.2, 2))) for name in WIND})
+    rest = ResidualConstants(**{name: exactly(float(rng.uniform(0.01, 0.1))) for name in ("push", "size")})
     problem = alive(
         values=values,
         predictor_gain=[None, F("3.5")][rng.integers(2)],
@@ -116,11 +108,7 @@ def of_producer(problem: TubeProblem, gains: RateRecipe, own: DistanceRecipe) ->
 def of_recheck(problem: TubeProblem, gains: RateRecipe, own: DistanceRecipe) -> Told:
     """The same, as recheck reads it."""
     with ctx.workprec(160):
-        setting = setting_of(problem)
-        at = Gains(**{name: getattr(gains, name) for name in GAINS})
-        proof = DistanceProof(
-            **{name: exact(getattr(own, name)) for name in ("speed", "prediction_error", "uncertainty")}
-        )
+        setting, at, proof = reading(problem), gains_of(gains), proof_of(own)
         S = (setting.n.h_t + setting.n.h_x * proof.speed) / exact(gains.bandwidth)
         held = conditions.larger(setting.n.h_initial, proof.uncertainty) + proof.prediction_error
         D = conditions.distance_bound(setting, at, proof)
@@ -139,32 +127,6 @@ def of_recheck(problem: TubeProblem, gains: RateRecipe, own: DistanceRecipe) -> 
         if setting.still:
             found |= {f"A: {name}": value for name, value in conditions.margins_26(setting, at).items()}
         return {name: (float(value.lower()), float(value.upper())) for name, value in found.items()}
-
-
-def setting_of(problem: TubeProblem) -> Setting:
-    """A problem as recheck has it: what unknown parameters do is a part of the plan's defect and drift."""
-    c, w, rest = problem.constants, problem.wind, problem.residual
-
-    def ball(constant: Constant) -> arb:
-        return exact(F(constant.below if constant is c.lower else constant.above))
-
-    n = Numbers(**{item.name: ball(getattr(c, item.name)) for item in fields(Numbers)})
-    push, size = (arb(0), arb(0)) if rest is None else (ball(rest.push), ball(rest.size))
-    n = replace(n, plan_defect_metric=n.plan_defect_metric + push, drift_on_plan=n.drift_on_plan + size)
-    blowing = (
-        None
-        if w is None
-        else WindNumbers(*(ball(getattr(w.constants, name)) for name in WIND), exact(w.bound))
-    )
-    system = replace(
-        case_of(certified(SMALL, conditions="distance")).system,
-        rate=problem.rate,
-        horizon=problem.horizon,
-        predictor_gain=problem.predictor_gain,
-        smooth=problem.smooth,
-    )
-    turns = not problem.constant_input
-    return Setting(system, n, problem.rho, problem.rho_a, blowing, turns=turns, rest=size)
 
 
 def differs(one: Told, other: Told) -> bool:
@@ -189,18 +151,13 @@ def points() -> list[tuple[Point, Told, Told]]:
     return [(at, of_producer(*at), of_recheck(*at)) for at in made]
 
 
-@pytest.mark.slow
-def test_both_readings_agree(points):
-    assert [at for at, one, other in points if differs(one, other)] == []
-
-
 # -- mutations
 
 UNTOLD = {
-    "producer": {"conditions.wind.felt 1: 1"},  # it is asked for where something is felt
-    "recheck": {
-        "recheck.conditions.Setting.still 1: self.wind.size / self.wind.bound"
-    },  # only its sign counts
+    # it is asked for where something is felt
+    "producer": {"conditions.wind.felt 1: 1"},
+    # only its sign counts
+    "recheck": {"recheck.conditions.Setting.still 1: self.wind.size / self.wind.bound"},
 }
 OF_PRODUCER = {
     alone: "ultimate supremum",

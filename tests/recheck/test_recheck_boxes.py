@@ -29,15 +29,11 @@ from tubecert.recheck.terms import number, slopes
 
 NAMES = "xyz"
 FEW = [
-    "x**3*y - 0.37*x*z + 2",
-    "sin(x)**2*cos(x)**3 + sin(x)**4*y",
-    "(1 + x*y)/(2 + sin(x)**2)**3 - y/(2 + sin(x)**2)",
-    "(3 + cos(y))**-2*x + exp(x*y)*z",
-    "sqrt(4 + x)*sin(y)*cos(y)**2 - z*tan(x/2)/sqrt(4 + x)",
-    "(x + 0.1*y - z)**5",
-    "tanh(3*x)*y + atan(x*y) - log(3 + z)",
-    "asin(x/3)*sinh(y) + acos(z/4)*cosh(x*y)",
-]
+    "x**3*y - 0.37*x*z + 2", "sin(x)**2*cos(x)**3 + sin(x)**4*y",
+    "(1 + x*y)/(2 + sin(x)**2)**3 - y/(2 + sin(x)**2)", "(3 + cos(y))**-2*x + exp(x*y)*z",
+    "sqrt(4 + x)*sin(y)*cos(y)**2 - z*tan(x/2)/sqrt(4 + x)", "(x + 0.1*y - z)**5",
+    "tanh(3*x)*y + atan(x*y) - log(3 + z)", "asin(x/3)*sinh(y) + acos(z/4)*cosh(x*y)",
+]  # fmt: skip
 BENDING = ["exp(x) - x*y**3", "sin(2*x)*cos(3*y) + z*x**2", "(x + y)**4*z", "sqrt(3 + x*y) + z"]
 SYMMETRIC = [
     ["2 + exp(x)", "0.3*sin(y)*x", "z*cos(x)"],
@@ -226,13 +222,9 @@ def check_slopes():
 
 
 CHECKS = {
-    "monomials": check_monomials,
-    "expansion": check_expansion,
-    "norms": check_norms,
-    "definiteness": check_definiteness,
-    "signs": check_signs,
-    "slopes": check_slopes,
-}
+    "monomials": check_monomials, "expansion": check_expansion, "norms": check_norms,
+    "definiteness": check_definiteness, "signs": check_signs, "slopes": check_slopes,
+}  # fmt: skip
 
 
 @pytest.mark.slow

@@ -8,7 +8,6 @@ import yaml
 from rechecked import CONFIGS, certified, examine, failing, respecified, sealed, unconfirmed
 from systems import SMALL
 
-from tubecert.errors import TubecertError
 from tubecert.recheck.clearances import _square, _turned
 from tubecert.recheck.obstacles import Shape, is_simple
 
@@ -73,12 +72,12 @@ def test_planted_faults_are_refused(clear, fault):
     assert unconfirmed(forged)
 
 
+SQUARE = [["-6", "-6"], ["6", "-6"], ["6", "6"], ["-6", "6"]]
 MOVES = {
     "nearer": lambda s: s["obstacles"][0]["disc"].update(center=["2.5", "0"]),
     "larger": lambda s: s["obstacles"][0]["disc"].update(radius="0.9"),
-    "around the plan": lambda s: s["obstacles"][1].update(
-        polygon=[["-6", "-6"], ["6", "-6"], ["6", "6"], ["-6", "6"]]
-    ),
+    "around the plan": lambda s: s["obstacles"][1].update(polygon=SQUARE),
+    "around the plan, listed twice": lambda s: s["obstacles"][1].update(polygon=SQUARE * 2),
     "in another plane": lambda s: s["obstacles"][0].update(
         states=["x2", "x1"], disc={"center": ["1", "1"], "radius": "1"}
     ),
@@ -92,11 +91,7 @@ MOVES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("move", MOVES)
 def test_an_obstacle_elsewhere_is_noticed(clear, move):
-    try:
-        forged = respecified(clear, MOVES[move])
-    except TubecertError:
-        return
-    assert unconfirmed(forged)
+    assert unconfirmed(respecified(clear, MOVES[move]))
 
 
 @pytest.mark.slow
@@ -131,15 +126,6 @@ def test_only_simple_polygons_have_an_inside(corners, simple):
         turned = (*exact[k:], *exact[:k])
         assert is_simple(turned) is simple
         assert is_simple(turned[::-1]) is simple
-
-
-@pytest.mark.slow
-def test_a_polygon_around_the_plan_listed_twice_is_refused(clear):
-    forged = respecified(
-        clear,
-        lambda s: s["obstacles"][1].update(polygon=[["-6", "-6"], ["6", "-6"], ["6", "6"], ["-6", "6"]] * 2),
-    )
-    assert unconfirmed(forged)
 
 
 # -- where W12 is not the same everywhere in the tube, what counts is the end that makes the tube wide

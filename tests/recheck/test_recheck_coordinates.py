@@ -32,15 +32,7 @@ IN_Z = (
     .replace('[[1, "-0.3"], ["-0.3", 2]]', "[[1, 0], [0, 1]]")
     .replace("initial_state: {at: [0.05, 0]}", 'initial_state: {at: [0.05, "3/220"]}')
 )
-FROM_Z = (
-    "constants",
-    "conditions_26",
-    "distance",
-    "no_adaptation",
-    "proof",
-    "decided_by",
-    "reasons",
-)
+FROM_Z = ("constants", "conditions_26", "distance", "no_adaptation", "proof", "decided_by", "reasons")
 
 
 def in_coordinates():

@@ -66,6 +66,9 @@ def ends_early(margin: list[float]) -> None:
 
 
 A, B, ALONE = "conditions_26", "distance", "no_adaptation"
+CLAIMS_A = ("26a", "26b", "26c")
+MARGINS_A, SUP_B = "A: (26a)-(26c)", "B: sup D < dbar"
+SHORTFALL = {"condition": "x", "margin": [0, 1], "allowed": 1, "needed": 1, "missing": 0}
 OF_0: dict[str, tuple[Change, str]] = {
     "margin": (lambda r: more(r[ALONE]["margin"]), "0: sup D < dbar"),
     "margin that is none": (lambda r: r[ALONE].update(margin=[-0.1, 0.9]), "0: sup D < dbar"),
@@ -76,6 +79,10 @@ OF_0: dict[str, tuple[Change, str]] = {
     "ultimate radius": (lambda r: times(r[ALONE], "ultimate_radius", 1 - 1e-6), "0: sup D < dbar"),
     "largest h": (lambda r: times(r[ALONE], "uncertainty_limit", 1 + 1e-6), "0: without adaptation"),
     "no recipe": (lambda r: r["proof"].pop(ALONE), ""),
+    "a recipe that is not empty": (lambda r: r["proof"][ALONE].update(speed="1"), ""),
+    "no margin": (lambda r: r[ALONE].update(margin=None), ""),
+    "a key that is not known": (lambda r: r[ALONE].update(bandwidth=10), ""),
+    "a shortfall": (lambda r: r[ALONE]["shortfalls"].append(SHORTFALL), ""),
 }
 
 
@@ -88,24 +95,21 @@ def pair(r: Result, key: str, **factors: float) -> None:
 
 
 OF_A: dict[str, tuple[Change, str]] = {
+    **{f"margin of {c}": (lambda r, c=c: more(r[A]["margins"][c]), MARGINS_A) for c in CLAIMS_A},
     **{
-        f"margin of {claim}": (lambda r, claim=claim: more(r[A]["margins"][claim]), "A: (26a)-(26c)")
-        for claim in ("26a", "26b", "26c")
-    },
-    **{
-        f"margin of {claim} at the least rate": (
-            lambda r, claim=claim: more(r[A]["least_adaptation"]["margins"][claim]),
-            "A: (26a)-(26c)",
+        f"margin of {c} at the least rate": (
+            lambda r, c=c: more(r[A]["least_adaptation"]["margins"][c]),
+            MARGINS_A,
         )
-        for claim in ("26a", "26b", "26c")
+        for c in CLAIMS_A
     },
-    "margin that ends before it begins": (lambda r: ends_early(r[A]["margins"]["26b"]), "A: (26a)-(26c)"),
-    "bandwidth": (lambda r: pair(r, A, bandwidth=0.99), "A: (26a)-(26c)"),
-    "rate": (lambda r: pair(r, A, adaptation_rate=0.999), "A: (26a)-(26c)"),
-    "projection": (lambda r: pair(r, A, projection_radius=0.999), "A: (26a)-(26c)"),
-    "least rate": (lambda r: times(r[A]["least_adaptation"], "adaptation_rate", 0.999), "A: (26a)-(26c)"),
-    "predictor": (lambda r: pair(r, A, predictor_gain=0.5), "A: (26a)-(26c)"),
-    "predictor that is not damped": (lambda r: pair(r, A, predictor_gain=-1), "A: (26a)-(26c)"),
+    "margin that ends before it begins": (lambda r: ends_early(r[A]["margins"]["26b"]), MARGINS_A),
+    "bandwidth": (lambda r: pair(r, A, bandwidth=0.99), MARGINS_A),
+    "rate": (lambda r: pair(r, A, adaptation_rate=0.999), MARGINS_A),
+    "projection": (lambda r: pair(r, A, projection_radius=0.999), MARGINS_A),
+    "least rate": (lambda r: times(r[A]["least_adaptation"], "adaptation_rate", 0.999), MARGINS_A),
+    "predictor": (lambda r: pair(r, A, predictor_gain=0.5), MARGINS_A),
+    "predictor that is not damped": (lambda r: pair(r, A, predictor_gain=-1), MARGINS_A),
     "predictor of the recipe": (lambda r: times(r["proof"][A], "predictor_gain", 2), "A: its recipe"),
     "recipe": (lambda r: r["proof"][A].update(bandwidth=4.0), "A: its recipe"),
     "ultimate radius": (lambda r: times(r[A], "ultimate_radius", 1 - 1e-6), "A: ultimate radius"),
@@ -115,35 +119,46 @@ DERIVED = (
     *("zeta_1", "zeta_3"),
 )
 OF_B: dict[str, tuple[Change, str]] = {
-    "margin": (lambda r: more(r[B]["least_adaptation"]["margin"]), "B: sup D < dbar"),
-    "margin of the split": (lambda r: more(r[B]["split"]["margin"]), "B: sup D < dbar"),
-    "margin that ends before it begins": (lambda r: ends_early(r[B]["split"]["margin"]), "B: sup D < dbar"),
-    "bandwidth": (lambda r: pair(r, B, bandwidth=0.99), "B: sup D < dbar"),
-    "rate": (lambda r: pair(r, B, adaptation_rate=0.999), "B: sup D < dbar"),
-    "predictor": (lambda r: pair(r, B, predictor_gain=0.5), "B: sup D < dbar"),
-    "predictor that is not damped": (lambda r: pair(r, B, predictor_gain=-1), "B: sup D < dbar"),
-    "rate of the split": (lambda r: times(r[B]["split"], "adaptation_rate", 0.99), "B: sup D < dbar"),
-    "projection": (lambda r: pair(r, B, projection_radius=0.999), "B: sup D < dbar"),
-    "projection of the split": (
-        lambda r: times(r[B]["split"], "projection_radius", 0.999),
-        "B: sup D < dbar",
-    ),
-    "gains of the recipe": (lambda r: r["proof"][B].update(adaptation_rate=1e9), "B: sup D < dbar"),
+    "margin": (lambda r: more(r[B]["least_adaptation"]["margin"]), SUP_B),
+    "margin of the split": (lambda r: more(r[B]["split"]["margin"]), SUP_B),
+    "margin that ends before it begins": (lambda r: ends_early(r[B]["split"]["margin"]), SUP_B),
+    "bandwidth": (lambda r: pair(r, B, bandwidth=0.99), SUP_B),
+    "rate": (lambda r: pair(r, B, adaptation_rate=0.999), SUP_B),
+    "predictor": (lambda r: pair(r, B, predictor_gain=0.5), SUP_B),
+    "predictor that is not damped": (lambda r: pair(r, B, predictor_gain=-1), SUP_B),
+    "rate of the split": (lambda r: times(r[B]["split"], "adaptation_rate", 0.99), SUP_B),
+    "projection": (lambda r: pair(r, B, projection_radius=0.999), SUP_B),
+    "projection of the split": (lambda r: times(r[B]["split"], "projection_radius", 0.999), SUP_B),
+    "gains of the recipe": (lambda r: r["proof"][B].update(adaptation_rate=1e9), SUP_B),
     **{
-        name: (lambda r, name=name: times(r["proof"][B], name, 1 - 1e-6), "B: sup D < dbar")
+        name: (lambda r, name=name: times(r["proof"][B], name, 1 - 1e-6), SUP_B)
         for name in ("speed", "prediction_error", "uncertainty")
     },
-    "error that is too large": (lambda r: times(r["proof"][B], "prediction_error", 1.001), "B: sup D < dbar"),
+    "error that is too large": (lambda r: times(r["proof"][B], "prediction_error", 1.001), SUP_B),
     "radius": (lambda r: times(r[B], "ultimate_radius", 1 - 1e-6), "B: ultimate radius"),
-    "radius of the pair": (
-        lambda r: times(r[B]["least_adaptation"], "ultimate_radius", 1 - 1e-6),
-        "B: sup D < dbar",
-    ),
-    "radius of the split": (lambda r: times(r[B]["split"], "ultimate_radius", 1 - 1e-3), "B: sup D < dbar"),
+    "radius of the pair": (lambda r: times(r[B]["least_adaptation"], "ultimate_radius", 1 - 1e-6), SUP_B),
+    "radius of the split": (lambda r: times(r[B]["split"], "ultimate_radius", 1 - 1e-3), SUP_B),
     "radius without one of the pair": (
         lambda r: r[B]["least_adaptation"].update(ultimate_radius=None),
         "B: ultimate radius",
     ),
+    "no bandwidth": (lambda r: pair(r, B, bandwidth=0), ""),
+    "a negative rate": (lambda r: pair(r, B, adaptation_rate=-1), SUP_B),
+    "another rate than that of the recipe": (
+        lambda r: times(r[B]["least_adaptation"], "adaptation_rate", 0.99),
+        SUP_B,
+    ),
+    "an extreme Y": (lambda r: r["proof"][B].update(speed=1e308), ""),
+    "a Y that is no number": (lambda r: r["proof"][B].update(speed="nan"), ""),
+    "no recipe": (lambda r: r["proof"].pop(B), ""),
+    "half a recipe": (lambda r: r["proof"][B].pop("uncertainty"), ""),
+    "a key of the recipe that is not known": (lambda r: r["proof"][B].update(settling=1.0), ""),
+    "no section": (lambda r: r.pop(B), ""),
+    "a key of the section that is not known": (lambda r: r[B].update(windows=[]), ""),
+    "no pair": (lambda r: r[B].update(least_adaptation=None), ""),
+    "it decides twice": (lambda r: r["decided_by"].append(B), ""),
+    "half-widths of the states": (lambda r: times(r["tube"]["half_widths"], "x", 0.97), "half-width of x"),
+    "a half-width of nobody": (lambda r: r["tube"]["half_widths"].update(z=1.0), ""),
 }
 
 

@@ -193,13 +193,9 @@ def test_a_supremum_bounds_that_of_every_number_of_its_balls(share):
     for k in range(300):
         d0, beta, H0, S, e, delta, lam = map(float, np.exp(rng.uniform(-2.5, 1.5, 7)))
         own = {
-            "d0": d0 * (k % 3 > 0),
-            "beta": beta,
-            "H0": H0,
-            "S": (S, H0, S / 50)[k % 3],
-            "e": e,
+            "d0": d0 * (k % 3 > 0), "beta": beta, "H0": H0, "S": (S, H0, S / 50)[k % 3], "e": e,
             "delta": delta,
-        }
+        }  # fmt: skip
         w = lam * (1.0, 1 + 1e-13, 0.2, 3.0, 40.0)[k % 5]
         T = None if k % 2 else float(np.exp(rng.uniform(-3, 2))) / lam
         balls = {name: arb(x, share * x * (rng.random() < 0.5)) for name, x in own.items()}
@@ -231,7 +227,8 @@ def test_a_kernel_bounds_that_of_every_number_of_its_balls(share):
         for _ in range(3):
             true = oracle.kernel(mpmath.mpf(c), mpmath.mpf(w), *(inside(x, rng) for x in balls))
             assert digits(found.upper()) >= true
-            assert share > 0 or digits(found.upper()) <= true + CLOSE * true
+            # where a ball cannot tell the case, a start that adds nothing costs nothing
+            assert share > 1e-12 or digits(found.upper()) <= true + (1e-9 if share else CLOSE) * true
         # sup |e^(-wt) - e^(-ct)|/|c - w| is that of a course as well
         peak = oracle.Course(*map(mpmath.mpf, (0, 1, 1, 0, 0, 0)), mpmath.mpf(c), mpmath.mpf(w)).supremum()
         same(kappa(arb(c), arb(w)), peak, "kappa")

@@ -4,12 +4,9 @@ import copy
 
 import pytest
 import tampers
-from rechecked import CONFIGS, certified, examine, failing, respecified, sealed
+from rechecked import certified, examine, failing, respecified, unconfirmed
 from systems import BLOWN, SMALL
 
-from tubecert.errors import TubecertError
-
-ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text("utf-8")
 # sup u* and inf u* have closed forms, and the feedback has something to do
 ONE = """
 tubecert: 1
@@ -27,14 +24,6 @@ metric: {dual_metric: [[1]], rate: 0.9}
 """
 LIMITS = "limits: {u: [-2, 2.5]}\n"
 KINDS = ("no_adaptation", "conditions_26", "distance")
-
-
-def refused(document):
-    """Whether a forged certificate, sealed again, is not confirmed."""
-    try:
-        return bool(failing(examine(sealed(document), to_first_failure=True)))
-    except TubecertError:
-        return True
 
 
 @pytest.fixture(scope="module")
@@ -113,10 +102,10 @@ FAULTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
-def test_planted_faults_are_refused(made, fault):
+def test_planted_faults_are_unconfirmed(made, fault):
     forged = copy.deepcopy(made)
     FAULTS[fault](forged["result"])
-    assert refused(forged)
+    assert unconfirmed(forged)
 
 
 @pytest.mark.slow
@@ -127,9 +116,9 @@ def test_a_weaker_bound_is_confirmed(made):
     own["feedback"] *= 1.01
     own["least"] -= 0.1
     own["greatest"] += 0.1
-    assert not refused(weaker)
+    assert not unconfirmed(weaker)
     narrow(weaker["result"], "greatest", 1.001)
-    assert not refused(weaker)
+    assert not unconfirmed(weaker)
 
 
 CHANGES = {
@@ -147,11 +136,7 @@ CHANGES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_another_specification_is_noticed(made, change):
-    try:
-        forged = respecified(made, CHANGES[change])
-    except TubecertError:
-        return
-    assert refused(forged)
+    assert unconfirmed(respecified(made, CHANGES[change]))
 
 
 @pytest.mark.slow
@@ -159,10 +144,10 @@ def test_narrower_limits_need_an_entry_that_is_theirs_and_within(made):
     """Specification and entry agree, and the bound does not lie within."""
     forged = respecified(made, lambda s: s["limits"].update(u=["-2", "0.3"]))
     first(forged["result"]).update(limits=[-2.0, 0.3])
-    assert refused(forged)
+    assert unconfirmed(forged)
     fair = respecified(made, lambda s: s["limits"].update(u=["-2", "2"]))
     first(fair["result"]).update(limits=[-2.0, 2.0])
-    assert not refused(fair)
+    assert not unconfirmed(fair)
 
 
 @pytest.mark.slow
@@ -180,7 +165,7 @@ def test_a_kind_that_does_not_decide_may_miss_the_limits(made):
     assert (reason["section"], reason["side"], reason["verdict"]) == ("distance", "upper", "undecided")
     forged = copy.deepcopy(alone)
     forged["result"]["decided_by"] = ["distance"]
-    assert refused(forged)
+    assert unconfirmed(forged)
 
 
 @pytest.mark.slow
@@ -196,9 +181,9 @@ def test_a_plan_beyond_its_limits_refutes_and_recheck_sees_it():
     assert not failing(examine(made))
     elsewhere = copy.deepcopy(made)
     next(r for r in elsewhere["result"]["reasons"] if r["verdict"] == "refuted")["at"]["t"] = 2.5
-    assert refused(elsewhere)
+    assert unconfirmed(elsewhere)
     forged = respecified(made, lambda s: s["limits"].update(u=["-2", "2"]))
-    assert refused(forged)
+    assert unconfirmed(forged)
 
 
 @pytest.mark.slow
@@ -214,7 +199,7 @@ def test_a_family_whose_box_exceeds_the_limits_is_undecided():
     assert not failing(examine(inside))
     narrowed = copy.deepcopy(inside)
     narrow(narrowed["result"], "greatest", 0.999)
-    assert refused(narrowed)
+    assert unconfirmed(narrowed)
     beyond = certified(family + "limits: {u: [-2, 0.4]}\n")["result"]
     assert beyond["inputs"][0]["verdict"] == beyond["verdict"] == "undecided"
 
@@ -229,16 +214,6 @@ def test_without_limits_nothing_is_said():
 
 
 @pytest.mark.slow
-def test_the_orbit_is_confirmed_and_less_is_not():
-    made = certified(ORBIT + "limits: {u: [-8, 8]}\n", conditions="distance")
-    assert not failing(examine(made))
-    for fault in ("less feedback, distance", "less feedback, conditions_26", "less adaptation"):
-        forged = copy.deepcopy(made)
-        FAULTS[fault](forged["result"])
-        assert refused(forged), fault
-
-
-@pytest.mark.slow
 def test_wind_is_a_part_of_the_distance_that_the_feedback_answers():
     calm, windy = (certified(text + "limits: {u: [-4, 4]}\n", conditions="0") for text in (SMALL, BLOWN))
     assert not failing(examine(windy))
@@ -246,7 +221,7 @@ def test_wind_is_a_part_of_the_distance_that_the_feedback_answers():
     assert other > own * 1.01
     forged = copy.deepcopy(windy)
     bound(forged["result"], "no_adaptation")["feedback"] = own
-    assert refused(forged)
+    assert unconfirmed(forged)
 
 
 @pytest.mark.slow

@@ -129,27 +129,22 @@ def test_gains_that_were_asked_for():
     little = certified(SMALL, bandwidth=Fraction(1, 10), adaptation_rate=Fraction(1), conditions="26")
     assert little["result"]["verdict"] == "refuted"
     assert examine(little).exit_code == ExitCode.NOT_CERTIFIED
-    section = enough["result"]["conditions_26"]
-    section["bandwidth"] = 2.0
-    enough["result"]["proof"]["conditions_26"]["bandwidth"] = enough["result"]["overrides"]["bandwidth"] = 2.0
-    enough["hash"] = certificate.seal(enough["result"], {})["hash"]
-    assert any("(26a)" in claim for claim, _ in failing(examine(enough)))
 
 
 @pytest.mark.parametrize(
-    ("change", "verdict", "code"),
+    "change",
     [
-        (("safe_set: {x: [-1, 1]", "safe_set: {x: [-0.2, 1]"), "refuted", ExitCode.NOT_CERTIFIED),
-        (("rate: 0.8", "rate: 1.4"), "refuted", ExitCode.NOT_CERTIFIED),
-        (("metric: {", "metric: {bounds: {lower: 0.4, upper: 1}, "), "refuted", ExitCode.NOT_CERTIFIED),
+        ("safe_set: {x: [-1, 1]", "safe_set: {x: [-0.2, 1]"),
+        ("rate: 0.8", "rate: 1.4"),
+        ("metric: {", "metric: {bounds: {lower: 0.4, upper: 1}, "),
     ],
     ids=["the tube leaves the set", "the metric fails", "declared bounds of the metric fail"],
 )
-def test_what_is_not_certified_is_never_certified(change, verdict, code):
+def test_what_is_not_certified_is_never_certified(change):
     document = certified(replaced(SMALL, change))
-    assert document["result"]["verdict"] == verdict
+    assert document["result"]["verdict"] == "refuted"
     found = examine(document)
-    assert found.exit_code == code
+    assert found.exit_code == ExitCode.NOT_CERTIFIED
     assert failing(found) == []
 
 
@@ -423,38 +418,27 @@ def test_a_slip_in_the_addition_theorems_is_caught(slip, monkeypatch):
     assert failed > 0
 
 
+VANISHING = {
+    True: "sqrt(x)**2 - x; sqrt(x*y)**2/x - y; x/sqrt(x) - sqrt(x); sqrt(2)**2 - 2; sqrt(x/y)**2*y - x",
+    False: "sqrt(x) - x; sqrt(x**2) - x; sqrt(x) - sqrt(y); sqrt(2) - 1; sqrt(x/y) - x; exp(x) - 1; sin(x)",
+}
+AT_FOUR = {
+    True: "sqrt(x) - 2; exp(x - 4) - 1; sin(x - 4); cos(4 - x) - 1; tan(x - 4); sqrt(x - 4); sqrt(x/9) - 2/3",
+    False: "sqrt(x + 1) - 2; exp(x) - 1; cos(x) - 1; sqrt(x) + 2",
+}
+
+
+def cases(table):
+    return [(text, zero) for zero, texts in table.items() for text in texts.split("; ")]
+
+
 @pytest.mark.parametrize(
-    ("text", "zero"),
-    [
-        *[("sqrt(x)**2 - x", True), ("sqrt(x*y)**2/x - y", True), ("x/sqrt(x) - sqrt(x)", True)],
-        *[("sqrt(x) - x", False), ("sqrt(x**2) - x", False), ("sqrt(x) - sqrt(y)", False)],
-        *[
-            ("sqrt(2)**2 - 2", True),
-            ("sqrt(2) - 1", False),
-            ("sqrt(x/y)**2*y - x", True),
-            ("sqrt(x/y) - x", False),
-        ],
-        *[
-            ("exp(x) - 1", False),
-            ("sin(x)**2 + cos(x)**2 - 1", True),
-            ("sin(x)", False),
-            ("cos(x) - 1", False),
-        ],
-    ],
+    ("text", "zero"), [*cases(VANISHING), ("sin(x)**2 + cos(x)**2 - 1", True), ("cos(x) - 1", False)]
 )
 def test_what_vanishes(text, zero):
-    term = terms([text], "xy")
-    assert vanish(term) is zero
+    assert vanish(terms([text], "xy")) is zero
 
 
-@pytest.mark.parametrize(
-    ("text", "zero"),
-    [
-        *[("sqrt(x) - 2", True), ("exp(x - 4) - 1", True), ("sin(x - 4)", True), ("cos(4 - x) - 1", True)],
-        *[("tan(x - 4)", True), ("sqrt(x - 4)", True), ("sqrt(x/9) - 2/3", True), ("sqrt(x + 1) - 2", False)],
-        *[("exp(x) - 1", False), ("cos(x) - 1", False), ("sqrt(x) + 2", False)],
-    ],
-)
+@pytest.mark.parametrize(("text", "zero"), cases(AT_FOUR))
 def test_what_vanishes_at_a_point(text, zero):
-    (term,) = terms([text], "x")
-    assert vanish(matrix_replaced([[term]], {"x": number(Fraction(4))})[0]) is zero
+    assert vanish(matrix_replaced([terms([text], "x")], {"x": number(Fraction(4))})[0]) is zero

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import copy
-import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rechecked import certified, doubted, examine, failing, respecified, sealed
+from rechecked import certified, doubted, examine, failing, respecified, sealed, written
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
-from tubecert.certificate import dump, seal
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError, TubecertError
 from tubecert.findings import Severity
@@ -234,7 +232,7 @@ def test_knots_know_their_time(tmp_path):
         "{kind: equilibrium, at: [0, 0], input: [0]}", "{kind: csv, file: plan.csv}"
     ).replace("{within: 0.05}", "{at: [0.05, 0]}")
     spec = load_text(text, str(tmp_path / "spec.yaml"))
-    document = json.loads(dump(seal(certify(spec, Options(conditions="distance")).to_json(), {})))
+    document = written(certify(spec, Options(conditions="distance")).to_json())
     spline = CubicHermiteSpline(t, x.T, np.array([f(a, z) for a, z in zip(t, x.T, strict=True)]))
     s = np.linspace(0, 2, 5001)
     missed = np.array([spline(a, 1) - f(a, spline(a)) for a in s])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from tubecert.recheck.balls import exact
 from tubecert.recheck.metric import adjugate, determinant
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import number, variable
@@ -20,11 +21,15 @@ def test_determinants_are_not_made_minor_by_minor():
     whole, inverse = determinant(rows), adjugate(rows)
     values = [number(2 + i) for i in range(n)] + [number(1)]
     at = [
-        Program([e], names).run([_ball(v) for v in values])[0] for e in (whole, inverse[0][0], inverse[1][2])
+        Program([e], names).run([exact(v.value) for v in values])[0]
+        for e in (whole, inverse[0][0], inverse[1][2])
     ]
     by_row = sum(
-        (Program([rows[0][j] * inverse[j][0]], names).run([_ball(v) for v in values])[0] for j in range(n)),
-        start=_ball(number(0)),
+        (
+            Program([rows[0][j] * inverse[j][0]], names).run([exact(v.value) for v in values])[0]
+            for j in range(n)
+        ),
+        start=exact(0),
     )
     assert by_row.overlaps(at[0])
     assert at[0].is_finite()
@@ -35,9 +40,3 @@ def test_a_determinant_that_is_too_long_is_refused():
     rows = [[variable(f"a{i}_{j}") for j in range(14)] for i in range(14)]
     with pytest.raises(ValueError, match="too long"):
         determinant(rows)
-
-
-def _ball(term):
-    from flint import arb, fmpq
-
-    return arb(fmpq(term.value.numerator, term.value.denominator))

@@ -19,10 +19,10 @@ import rechecked
 from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rechecked import terms
+from rechecked import terms, written
 from systems import SMALL
 
-from tubecert import certificate, pipeline, spec
+from tubecert import pipeline, spec
 from tubecert.bounds.suprema import Suprema
 from tubecert.errors import ExitCode
 from tubecert.recheck import boxes, pencils
@@ -268,10 +268,6 @@ def test_a_gain_needs_the_rest_of_the_expansion_and_both_ends(monkeypatch):
 # -- constants without a bound
 
 
-def sealed(result):
-    return json.loads(certificate.dump(certificate.seal(result, {})))
-
-
 @pytest.mark.slow
 def test_a_constant_without_a_bound_is_not_examined(monkeypatch):
     """B does not rest on it: its certificate is confirmed."""
@@ -279,7 +275,7 @@ def test_a_constant_without_a_bound_is_not_examined(monkeypatch):
     monkeypatch.setattr(Suprema, "metric_slope", lambda self: replace(honest(self), above=math.inf))
     options = pipeline.Options(conditions="distance")
     with proven.barely():
-        document = sealed(pipeline.certify(spec.load_text(SMALL, "small.yaml"), options).to_json())
+        document = written(pipeline.certify(spec.load_text(SMALL, "small.yaml"), options).to_json())
     assert document["result"]["verdict"] == "certified"
     found = rechecked.examine(document)
     assert [(item.name, item.outcome.why) for item in found.claims if not item.outcome.holds] == []
@@ -304,19 +300,13 @@ def test_nothing_rests_on_a_constant_without_a_bound():
     document = rechecked.certified(SMALL)
     assert document["result"]["verdict"] == "certified"
     rests = (
-        "f_x",
-        "M_x",
-        "feedback_gain",
-        "h_initial",
-        "metric_input_gain",
-        "drift_on_plan",
-        "plan_defect_metric",
-        "B_pinv",
-    )
+        "f_x", "M_x", "feedback_gain", "h_initial", "metric_input_gain", "drift_on_plan",
+        "plan_defect_metric", "B_pinv",
+    )  # fmt: skip
     for name in rests:
         result = json.loads(json.dumps(document["result"]))
         result["constants"][name]["above"] = None
-        found = recheck(json.dumps(sealed(result)), "certificate", 2_000, to_first_failure=True)
+        found = recheck(json.dumps(written(result)), "certificate", 2_000, to_first_failure=True)
         assert found.verdict != "confirmed", name
 
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import copy
-import json
 from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 from flint import arb
-from rechecked import certified, doubted, examine, failing, respecified
+from rechecked import certified, doubted, examine, failing, respecified, written
 
-from tubecert import certificate, pipeline
+from tubecert import pipeline
 from tubecert.enclosure import lookup
 from tubecert.enclosure.interval import Interval
 from tubecert.errors import TubecertError
@@ -107,7 +106,7 @@ def test_a_producer_whose_enclosures_are_too_narrow_is_caught(monkeypatch):
 
     monkeypatch.setattr(lookup, "enclosure", narrow)
     result = pipeline.certify(load_text(SPEC, "spec.yaml"), pipeline.Options(conditions="distance"))
-    document = json.loads(certificate.dump(certificate.seal(result.to_json(), {})))
+    document = written(result.to_json())
     assert document["result"]["verdict"] == "certified"
     assert doubted(document)
 
