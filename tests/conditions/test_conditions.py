@@ -69,7 +69,6 @@ def test_margins_do_not_depend_on_the_scale_of_the_metric(c):
     )
 
 
-IN_26 = set(ALIVE) - {"metric_input_gain", "h_initial", "plan_defect", "f"}
 IN_DISTANCE = {
     "lower", "B", "B_pinv", "B_pinv_x", "h", "h_x", "h_t", "h_initial", "feedback_gain", "metric_input_gain",
     "drift_on_plan", "initial_distance", "plan_defect_metric",

@@ -18,7 +18,6 @@ from tubecert.search.proposers import PROPOSERS
 from tubecert.verdict import Verdict
 
 GAIN = 3.0  # du
-ALMOST = 1 + 1e-8
 FLOATS = st.floats(-1e6, 1e6)
 SIZES = st.floats(0, 1e6)
 
