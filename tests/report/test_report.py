@@ -70,9 +70,7 @@ def test_colour_changes_nothing_but_colour(make):
 
 def test_the_verdict_comes_first_with_its_numbers():
     assert line(certified()) == "certified pendulum: rho = 0.04124; omega = 41.82 rad/s, Gamma = 1.394e7"
-    for section, numbers in {
-        "distance": "omega = 10.8 rad/s, Gamma = 13800",
-    }.items():
+    for section, numbers in {"distance": "omega = 10.8 rad/s, Gamma = 13800"}.items():
         assert line(certified(decided_by=[section])).endswith(f"rho = 0.04124; {numbers}")
     every = line(certified(decided_by=["conditions_26", "distance"]))
     assert every.count("omega") == 2

@@ -181,17 +181,7 @@ def test_every_word_has_meaning_and_source(word):
 
 
 def test_numbers_say_their_unit():
-    for word in (
-        "rho",
-        "rho_a",
-        "epsilon",
-        "half-width",
-        "omega",
-        "Gamma",
-        "rate",
-        "h",
-        "noise",
-    ):
+    for word in ("rho", "rho_a", "epsilon", "half-width", "omega", "Gamma", "rate", "h", "noise"):
         assert "\n\nUnit: " in pages.words()[word].text()
 
 

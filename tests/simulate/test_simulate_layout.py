@@ -39,12 +39,7 @@ TWO = ControlAffineModel(
     rate=Fraction(1, 2),
     h=None,
 )
-GAINS = LoopGains(
-    bandwidth=7.0,
-    projection_radius=100.0,
-    predictor_gain=3.0,
-    adaptation_rate=11.0,
-)
+GAINS = LoopGains(bandwidth=7.0, projection_radius=100.0, predictor_gain=3.0, adaptation_rate=11.0)
 
 
 def problem(controller, **options):

@@ -62,10 +62,7 @@ ONE_INPUT = system(
     B=[["1/2"], ["-2"]],
     W=[["4.25828", "-0.93423"], ["-0.93423", "3.76692"]],
     rate="1.74",
-    h=(
-        (2 * sin(2 * T) + Fraction(1, 10) * X,),
-        lambda t, x: np.array([2 * np.sin(2 * t) + 0.1 * x[0]]),
-    ),
+    h=((2 * sin(2 * T) + Fraction(1, 10) * X,), lambda t, x: np.array([2 * np.sin(2 * t) + 0.1 * x[0]])),
 )
 TWO_INPUTS = system(
     ("x1", "x2", "x3"),

@@ -9,15 +9,7 @@ from hypothesis import strategies as st
 from simulated import setting
 
 from tubecert.simulate.monte_carlo import case
-from tubecert.simulate.uncertainty import (
-    WAVES,
-    Class,
-    Member,
-    adversary,
-    genes_of,
-    random_member,
-    triangle,
-)
+from tubecert.simulate.uncertainty import WAVES, Class, Member, adversary, genes_of, random_member, triangle
 
 bounds = st.floats(0.0, 10.0).map(lambda value: 0.0 if value < 1e-3 else value)
 seeds = st.integers(0, 2**32)

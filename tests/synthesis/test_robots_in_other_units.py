@@ -46,9 +46,7 @@ def test_the_gains_of_a_joint_do_not_depend_on_units(robots, tmp_path):
     spec = load(str(BENCHMARKS / "robots" / "joint.yaml"))
     omega, Gamma, widths = gains(spec, Fraction(4))
     units = robots.Units(
-        name="all at once",
-        sizes={"rad": robots.DEGREE, "N m": Fraction(1000)},
-        time=Fraction(1, 1000),
+        name="all at once", sizes={"rad": robots.DEGREE, "N m": Fraction(1000)}, time=Fraction(1, 1000)
     )
     other = load_text(json.dumps(robots.rescaled(spec, units, tmp_path)), str(tmp_path / "spec.yaml"))
     theirs = gains(other, Fraction(4) * units.time)

@@ -29,14 +29,7 @@ from tubecert.synthesis.chart import (
     degrees_of,
     monomial_matrix,
 )
-from tubecert.synthesis.conic import (
-    Affine,
-    ConicProgram,
-    SemidefiniteBlocks,
-    semidefinite,
-    solve,
-    triangle,
-)
+from tubecert.synthesis.conic import Affine, ConicProgram, SemidefiniteBlocks, semidefinite, solve, triangle
 from tubecert.synthesis.family import metric_family
 from tubecert.synthesis.frame import commuting_frame
 from tubecert.synthesis.gram import gram_form
@@ -330,13 +323,7 @@ def contraction_values(asked, V, states):
 @pytest.mark.parametrize(
     ("system", "box", "degree", "states", "weight"),
     [
-        (
-            THREE_STATE,
-            BOX_THREE,
-            2,
-            lambda u: [(0.1 * u, 0.03, end) for end in (-0.1, 0.1)],
-            lambda u: 1.0,
-        ),
+        (THREE_STATE, BOX_THREE, 2, lambda u: [(0.1 * u, 0.03, end) for end in (-0.1, 0.1)], lambda u: 1.0),
         (
             PENDULUM,
             BOX_PENDULUM,
