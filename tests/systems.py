@@ -47,6 +47,19 @@ def matrix_of(rows: Sequence[Sequence[str]], names: Sequence[str]) -> tuple[tupl
     return tuple(tuple(parse(e, symbols=symbols).expression for e in row) for row in rows)
 
 
+def plain_model(states: Sequence[str], f: Sequence[str], B: Sequence[Sequence[str]]) -> ControlAffineModel:
+    """x' = f + B u without a metric."""
+    return ControlAffineModel(
+        states=tuple(states),
+        inputs=tuple(f"u{j}" for j in range(len(B[0]))),
+        f=matrix_of([f], states)[0],
+        B=matrix_of(B, states),
+        W=(),
+        rate=Fraction(0),
+        h=None,
+    )
+
+
 def three_state(
     W: Any = None, rate: str = "0.9999", f: Sequence[str] = F_THREE, B: Any = None
 ) -> ControlAffineModel:

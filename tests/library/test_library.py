@@ -603,15 +603,6 @@ assert callable(simulate) and callable(certify)
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-def test_everything_that_is_offered_is_there():
-    assert set(tc.__all__) <= set(dir(tc))
-    for name in tc.__all__:
-        assert getattr(tc, name) is not None
-    assert callable(tc.simulate)
-    with pytest.raises(AttributeError, match="no attribute 'certfy'"):
-        _ = tc.certfy
-
-
 RIGHT = """
 from pathlib import Path
 

@@ -7,29 +7,20 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from systems import plain_model
 
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.expression import constant, graph, parse, substitute, symbol
+from tubecert.expression import constant, graph, substitute, symbol
 from tubecert.expression.matrix import Matrix, multiply, transpose
 from tubecert.model import ControlAffineModel, domain_findings, rank_decision
 from tubecert.spec import load_text
 
 STATES = ("x", "y", "z")
-SYMBOLS = {name: symbol(name) for name in STATES}
 EFFORT = Effort(budget=500)
 
 
 def model(B: list[list[str]]) -> ControlAffineModel:
-    n = len(B)
-    return ControlAffineModel(
-        states=STATES[:n],
-        inputs=tuple(f"u{j}" for j in range(len(B[0]))),
-        f=(constant(0),) * n,
-        B=tuple(tuple(parse(e, symbols=SYMBOLS).expression for e in row) for row in B),
-        W=(),
-        rate=Fraction(1),
-        h=None,
-    )
+    return plain_model(STATES[: len(B)], ["0"] * len(B), B)
 
 
 def verdict(B: list[list[str]], side: tuple[str, str] = ("-1", "1")) -> str:

@@ -247,12 +247,6 @@ def test_without_a_tube_the_reason_is_told(files):
     assert "leaves the safe set" in result.stderr
 
 
-def test_help_has_an_example():
-    result = run("simulate", "--help")
-    assert result.exit_code == 0
-    assert "tubecert simulate plant.yaml" in result.stdout
-
-
 def test_a_metric_of_its_own(files):
     assert command("--metric", "w.json").exit_code == 2  # a certificate has one
     metric = {"format": "tubecert-metric/1", "rate": 0.1, "dual_metric": [["-1", "0"], ["0", "-1"]]}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 import signal
 import threading
 import time
+from dataclasses import replace
 from fractions import Fraction
-from typing import NamedTuple
+from importlib import import_module
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -19,7 +20,6 @@ from tubecert.model import ControlAffineModel
 from tubecert.progress import Phase
 from tubecert.simulate.compiled import KERNELS, compiled, entry, told
 from tubecert.simulate.integrator import integrate
-from tubecert.simulate.pointed import pointed
 from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.trajectory.plan import constant_plan
 
@@ -73,56 +73,7 @@ def test_compilation_is_told(monkeypatch):
         kernel(np.int16(1))
 
 
-class Pair(NamedTuple):
-    """Members of one type."""
-
-    low: float
-    high: float
-
-
-class Whole(NamedTuple):
-    """What is pointed to: a tuple in a tuple, arrays, a flag, and nothing."""
-
-    flag: bool
-    pair: Pair
-    values: np.ndarray
-    nothing: None
-    count: int
-
-
-@pytest.mark.slow
-def test_what_is_pointed_to_is_the_tuple_itself():
-    @compiled
-    def written(whole, place):
-        pair = whole.pair
-        whole.values[place] = pair.high - pair.low
-        return whole.values.shape[0] + whole.count if whole.flag and whole.nothing is None else -1
-
-    @entry
-    def kernel(whole, place):
-        return written(pointed(whole), place)
-
-    values = np.zeros(3)
-    assert kernel(Whole(True, Pair(1.0, 5.0), values, None, 7), 2) == 10
-    assert kernel(Whole(False, Pair(1.0, 2.0), values, None, 7), 1) == -1
-    assert values.tolist() == [0.0, 1.0, 4.0]
-
-
-def test_only_what_python_calls_is_machine_code_of_its_own():
-    """All that it calls is optimised and translated once, with it: otherwise to compile takes three times as long."""
-    kernel = fresh_kernel()
-    assert kernel(20.0) == 41.0
-    (part,) = inspect.getclosurevars(kernel.py_func).nonlocals.values()
-    (found,) = part.overloads.values()
-    assert not found.library.get_pointer_to_function(found.fndesc.mangled_name)
-    (found,) = kernel.overloads.values()
-    assert found.library.get_pointer_to_function(found.fndesc.mangled_name)
-
-
 def test_every_file_with_a_kernel_counts_for_the_cache():
-    from importlib import import_module
-    from pathlib import Path
-
     package = Path(import_module("tubecert.simulate").__file__).parent
     found = {path.stem for path in package.glob("*.py") if "compiled import" in path.read_text("utf-8")}
     assert found - {"monte_carlo", "campaign"} <= set(KERNELS)
@@ -162,7 +113,8 @@ def test_what_is_stopped_by_the_length_of_its_steps_is_given_shorter_ones():
 def test_an_interruption_ends_runs_that_would_take_minutes():
     """The lanes resolve 2e4 rad/s over 1000 s; Ctrl-C comes after a moment."""
     problem, starts, h = _of_1000_seconds(1e8)
-    integrate(_short(problem), starts, h, tolerance=1.0)  # compiles
+    short = replace(problem, horizon=1e-4, times=np.array([0.0, 1e-4]))
+    integrate(short, starts, h, tolerance=1.0)  # compiles
     pressed = []
 
     def press():
@@ -177,9 +129,3 @@ def test_an_interruption_ends_runs_that_would_take_minutes():
     finally:
         timer.cancel()
     assert time.perf_counter() - pressed[0] < 2.0
-
-
-def _short(problem):
-    from dataclasses import replace
-
-    return replace(problem, horizon=1e-4, times=np.array([0.0, 1e-4]))

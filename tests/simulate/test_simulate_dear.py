@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from simulated import setting
 
-from tubecert.simulate import campaign, monte_carlo
+from tubecert.simulate import campaign
 from tubecert.simulate.campaign import Attack, simulate
 from tubecert.simulate.tuning import Choice, loop_of
 
@@ -43,21 +41,3 @@ def test_a_loop_that_takes_many_steps_is_attacked_with_less_accurate_runs(monkey
     simulate(own, [loop_of(own, "l1", Choice())], count=1, seed=0)
     assert [each.dear for each in asked] == [most == 1]
     assert asked[0].tolerance == pytest.approx((5e-3 if most == 1 else 1e-3) * own.rho)
-
-
-def test_and_by_a_smaller_evolution(monkeypatch):
-    runs = []
-
-    def run(setting, kind, problem, cases, tolerance):
-        runs.append(len(cases))
-        return SimpleNamespace(worst=SimpleNamespace(distance=SimpleNamespace(value=np.zeros(len(cases)))))
-
-    monkeypatch.setattr(monte_carlo, "_run", run)
-    own = setting("flat")
-    loop, told = loop_of(own, "l1", Choice()), []
-    for each, count in ((own, 256), (replace(own, dear=True), 64)):
-        runs.clear()
-        told.clear()
-        monte_carlo.attack(each, loop, 0, told.append)
-        assert sum(runs) == count
-        assert {step.of for step in told} == {count}

@@ -7,7 +7,6 @@ import os
 import pickle
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from simulated import FLAT
@@ -247,20 +246,3 @@ def test_certification_neither_loads_kernels_nor_numba(tmp_path):
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
     )
     assert done.stdout.strip() == "[]", done.stderr
-
-
-def test_only_the_command_and_the_library_use_what_simulates():
-    """Beside them the report of a simulation, and exported code, which is driven by the same adversaries."""
-    import tubecert
-
-    package = Path(tubecert.__file__).parent
-    users = {
-        path.relative_to(package)
-        for path in package.rglob("*.py")
-        if "tubecert.simulate"
-        in "".join(line for line in path.read_text("utf-8").splitlines() if "import" in line)
-    }
-    driven = {Path("export", "driven.py"), Path("export", "continuous", "driven.py")}
-    beside = {Path("report", "simulation.py"), *driven}
-    rooms = {path.parts[0] for path in users - beside}
-    assert rooms == {"simulate", "cli", "library"}

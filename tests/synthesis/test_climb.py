@@ -1,6 +1,5 @@
 """Metrics without a rate: from slow to fast, by what a certification with them comes to, or nothing is written."""
 
-import io
 import json
 from dataclasses import replace
 from fractions import Fraction
@@ -10,11 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rich.console import Console
 from typer.testing import CliRunner
 
 from tubecert import pipeline
-from tubecert.certificate.searched import MetricRow, SearchData
 from tubecert.claims.advice import ConstantInputs
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.tube import TubeInSafeSet
@@ -24,7 +21,6 @@ from tubecert.model import build
 from tubecert.pipeline import Deadline, Options, synthesis
 from tubecert.pipeline.climb import Climb, slow_scale
 from tubecert.pipeline.synthesised import Row, Synthesised
-from tubecert.report.synthesis import report
 from tubecert.spec import Synthesis, load, load_text
 from tubecert.verdict import Verdict
 
@@ -170,16 +166,6 @@ def test_the_climb_finds_the_edge_of_what_fits(most, start):
     assert not climb.limits().faster or climb.limits().faster.cause == "overshoot"
 
 
-def test_it_hurries_where_the_filter_is_much_faster_than_the_contraction():
-    slow, fast = Valley(0, 100), Valley(0, 100)
-    fast.bandwidth = 100
-    for valley in (slow, fast):
-        climb = Climb(valley, "adaptation")
-        climb.run(Fraction(1, 10))
-        assert 100 / 1.5 < climb.best.rate <= 100
-    assert len(fast.asked) < len(slow.asked) - 2
-
-
 def test_a_narrower_tube_has_to_be_worth_a_slower_rate():
     """The tube narrows for ever, by less and less, while what is needed for it grows without bound."""
 
@@ -206,24 +192,6 @@ def test_a_higher_degree_has_to_be_worth_a_longer_metric():
         climb = Climb(Longer(0, 5), "adaptation")
         climb.run(Fraction(1))
         assert climb.best.degree == degree
-
-
-def test_metrics_of_one_rate_are_told_apart_by_their_degree():
-    """Two rows had the same rate and the same label."""
-    row = MetricRow(rate=Fraction(1), floor="identity", degree=0, condition_number=2.0)
-    said = []
-    for degree in (0, 2):
-        found = SearchData(
-            objective="adaptation",
-            verdict=Verdict.UNDECIDED,
-            attempts=(),
-            table=(row, replace(row, degree=degree)),
-        )
-        out = io.StringIO()
-        Console(file=out, width=100).print(*report(found, None, robot("pendulum"), "m.json"))
-        said.append([line.split()[:3] for line in out.getvalue().splitlines()])
-    assert [words for words in said[0] if words[:1] == ["1"]] == [["1", "condition", "2"]] * 2
-    assert [w for w in said[1] if w[:1] == ["1"]] == [["1", "0", "condition"], ["1", "2", "condition"]]
 
 
 def test_what_is_refuted_is_never_the_best():
@@ -397,6 +365,3 @@ def test_advice_costs_no_more_than_the_search():
     found = run.run(table=False)
     assert found.reason.relax
     assert spent[0].rounds <= max(run.ladder.rounds, 30)
-
-
-# -- for a machine

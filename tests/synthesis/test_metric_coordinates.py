@@ -13,7 +13,6 @@ from tubecert.enclosure.tape import Tape
 from tubecert.model import build
 from tubecert.pipeline import Options
 from tubecert.spec import Synthesis, load_text
-from tubecert.spec.canonical import synthesis_data
 from tubecert.synthesis.attempts import Request
 from tubecert.synthesis.coordinates import coordinates
 from tubecert.synthesis.family import metric_family
@@ -109,49 +108,10 @@ def test_scales_are_half_widths_or_none():
     family = metric_family(build(spec), degree=0, safe_set=spec.safe_set)
     box = [(Fraction(-3), Fraction(3)), (Fraction(0), Fraction(1)), (Fraction(-1), Fraction(3))]
     assert coordinates("auto", family, box).states.tolist() == [3, 0.5, 2]
-    assert coordinates("auto", family, box, (Fraction(1), Fraction(2), Fraction(4))).states.tolist() == [
-        1,
-        2,
-        4,
-    ]
-    own = coordinates("identity", family, box, (Fraction(1), Fraction(2), Fraction(4)))
+    widths = (Fraction(1), Fraction(2), Fraction(4))
+    assert coordinates("auto", family, box, widths).states.tolist() == [1, 2, 4]
+    own = coordinates("identity", family, box, widths)
     assert own.states.tolist() == own.columns.tolist() == [1, 1, 1]
-
-
-PENDULUM = """
-tubecert: 1
-name: pendulum
-system:
-  states: [q, w]
-  inputs: [u]
-  parameters: {{a: {a}, b: {b}}}
-  f: [a*w/b, "b*(-2*sin(q/a) - 0.2*w/b)"]
-  B: [[0], [b]]
-safe_set: {{q: [-a, a], w: [-3*b, 3*b]}}
-uncertainty: {{h: ["0.2*sin(t) + 0.1*q/a"]}}
-trajectory: {{kind: equilibrium, at: [0, 0], input: [0]}}
-initial_state: {{at: [0, 0]}}
-tube: {{half_widths: {{q: 0.15*a, w: 1.2*b}}}}
-"""
-
-
-@pytest.mark.slow
-def test_a_rate_that_is_searched_for_does_not_depend_on_units():
-    """Nor do the gains that it certifies with, in a tube of half-widths."""
-    rates, tables = [], []
-    for units in (dict.fromkeys("ab", 1), {"a": 57, "b": "1/10"}):
-        spec = load_text(PENDULUM.format(**units))
-        found = pipeline.synthesise(spec, Synthesis(degree=0), Options(conditions="distance"))
-        plain = [row for row in found.rows if row.floor == "identity"]
-        rates.append(found.file.rate)
-        tables.append([(float(row.rate), row.bandwidth, row.adaptation_rate) for row in plain])
-    assert rates[0] == rates[1]
-    assert np.array(tables[1]) == pytest.approx(np.array(tables[0]), rel=0.01)
-
-
-def test_the_default_is_free_of_units():
-    assert synthesis_data(Synthesis(rate=Fraction(1)))["coordinates"] == "auto"
-    assert synthesis_data(Synthesis(coordinates="identity"))["coordinates"] == "identity"
 
 
 @given(
@@ -273,6 +233,20 @@ def test_nor_where_a_metric_moves_with_powers_of_a_state(route):
         assert least(CUBIC, units, **wanted) == pytest.approx(reference, rel=1e-4)
 
 
+@pytest.mark.slow
+def test_a_rate_that_is_searched_for_does_not_depend_on_units():
+    """Nor do the gains that it certifies with, in a tube of half-widths."""
+    rates, tables = [], []
+    for units in (ONES, ONES | {"a": 57, "b": "1/10"}):
+        spec = load_text(DRIVEN.format(**units))
+        found = pipeline.synthesise(spec, Synthesis(degree=0), Options(conditions="distance"))
+        plain = [row for row in found.rows if row.floor == "identity"]
+        rates.append(found.file.rate)
+        tables.append([(float(row.rate), row.bandwidth, row.adaptation_rate) for row in plain])
+    assert rates[0] == rates[1]
+    assert np.array(tables[1]) == pytest.approx(np.array(tables[0]), rel=0.01)
+
+
 def test_the_frame_of_a_moving_input_does_not_depend_on_units():
     """The pivot rows are those that keep it small in half-widths: 1/(x + 10), not 1/x, whatever x is measured in."""
     frames = []
@@ -280,9 +254,8 @@ def test_the_frame_of_a_moving_input_does_not_depend_on_units():
         spec = load_text(TURNING.format(a=a, b=b, c=c))
         frame = metric_family(build(spec), degree=0, safe_set=spec.safe_set).frame
         x = [0.1 * a, 0.2 * b, 0.05 * c]
-        values = Tape([e for row in frame for e in row], spec.states).run_floats(
-            [np.array([q]) for q in x], (1,)
-        )
+        tape = Tape([e for row in frame for e in row], spec.states)
+        values = tape.run_floats([np.array([q]) for q in x], (1,))
         scale = np.array([a, b, c], dtype=float)
         frames.append(values.reshape(3, 3) * scale / scale[:, None])
     assert frames[1] == pytest.approx(frames[0], rel=1e-9)
@@ -299,13 +272,9 @@ def test_a_bare_synthesis_finds_the_same_in_another_unit_of_time(time):
             Options(conditions="distance"),
         )
         T, c = float(Fraction(units["T"])), float(Fraction(units["c"]))
-        tables.append(
-            [
-                (float(row.rate) / T, (row.bandwidth or 0) / T, (row.adaptation_rate or 0) / c**2)
-                for row in found.rows
-            ]
-        )
-    assert np.array(tables[1]) == pytest.approx(np.array(tables[0]), rel=0.01)
+        rows = [(float(row.rate), row.bandwidth or 0, row.adaptation_rate or 0) for row in found.rows]
+        tables.append(np.array(rows) / [T, T, c**2])
+    assert tables[1] == pytest.approx(tables[0], rel=0.01)
 
 
 @pytest.mark.slow

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from tubecert import pipeline
-from tubecert.model import build
 from tubecert.pipeline import Options
 from tubecert.spec import Synthesis, load, load_text
 from tubecert.verdict import Verdict
@@ -54,26 +53,3 @@ def test_the_gains_of_a_joint_do_not_depend_on_units(robots, tmp_path):
     assert theirs[0] / float(units.time) == pytest.approx(omega, rel=0.01)
     assert theirs[1] * 1000**2 == pytest.approx(Gamma, rel=0.01)
     assert np.array(theirs[2]) * sizes == pytest.approx(widths, rel=0.01)
-
-
-@pytest.mark.parametrize("name", ["slider", "missile", "car", "crane"])
-def test_the_generator_writes_the_same_system(robots, name, tmp_path):
-    """f, B u and x of the plan, at points, in the units of the file again."""
-    from tubecert.enclosure.tape import Tape
-
-    spec = load(str(BENCHMARKS / "robots" / f"{name}.yaml"))
-    units = robots.UNITS[2]
-    other = load_text(json.dumps(robots.rescaled(spec, units, tmp_path)), str(tmp_path / "spec.yaml"))
-    n, m = len(spec.states), len(spec.inputs)
-    sizes = np.array([float(units.of(dict(spec.units)[name])) for name in spec.states])
-    sizes = np.append(sizes, np.full(m, float(units.of_inputs(spec))))
-    rng = np.random.default_rng(1)
-    middle = np.array([[float(a), float(b)] for a, b in spec.safe_set]).mean(axis=1)
-    point = np.concatenate([middle + 0.1 * rng.random(n), rng.random(len(spec.inputs))])
-
-    def speed(own, at):
-        drift = [row[0] for row in build(own).drift_on_plan()]
-        return Tape(drift, (*own.states, *own.inputs)).run_floats(list(at[:, None]), (1,)).ravel()
-
-    back = speed(other, point / sizes) * sizes[:n] / float(units.time)
-    assert back == pytest.approx(speed(spec, point), rel=1e-9, abs=1e-9)

@@ -13,13 +13,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import optimum
-from systems import BOX_THREE, F_THREE, F_TWO, THREE, TWO, matrix_of
+from scipy import sparse
+from systems import BOX_THREE, F_THREE, F_TWO, THREE, TWO
+from systems import plain_model as model
 
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import ONE, ZERO, cos, sin, symbol
 from tubecert.metric.verify import verify_metric
-from tubecert.model import ControlAffineModel
 from tubecert.synthesis.chart import (
     Chart,
     NotPolynomialError,
@@ -40,18 +41,6 @@ from tubecert.synthesis.sos import propose_sos
 
 SOLVERS = ("clarabel", "scs")
 Q = Fraction
-
-
-def model(states, f, B):
-    return ControlAffineModel(
-        states=tuple(states),
-        inputs=tuple(f"u{j}" for j in range(len(B[0]))),
-        f=matrix_of([f], states)[0],
-        B=matrix_of(B, states),
-        W=(),
-        rate=Q(0),
-        h=None,
-    )
 
 
 def problem(system, box, *, degree, rate, **options):
@@ -104,7 +93,7 @@ def test_equalities_and_inequalities_hold(solver):
     assert np.linalg.eigvalsh(block.at(found.values))[0] > 0.7
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", [*SOLVERS, "cvxpy:CLARABEL", "cvxpy:SCS"])
 def test_infeasible_is_an_opinion_and_has_no_value(solver):
     both = [semidefinite([[-1.0]], [[[1.0]]]), semidefinite([[-1.0]], [[[-1.0]]])]
     found = solve(ConicProgram(cost=np.ones(1), semidefinite=both), solver)
@@ -127,6 +116,7 @@ def test_too_few_iterations_are_said():
     assert not found.finished
     assert found.feasible is None
     assert "max iterations" in found.status
+    assert not solve(program, "cvxpy:SCS", iterations=1, tolerance=1e-12).finished
 
 
 @pytest.mark.slow
@@ -162,13 +152,8 @@ def test_both_solvers_and_cvxpy_agree(seed, n, blocks):
 
 def test_coefficients_of_a_polynomial_in_an_angle_and_a_state():
     """What is read off the nodes is the function, everywhere: 2 sin q cos q x^2 + x - 3 cos^2 q on an uneven box."""
-    chart = Chart(
-        variables=(
-            Variable(name="q", lo=-0.5, hi=1.2, angle=1),
-            Variable(name="x", lo=-1.0, hi=3.0, angle=0),
-        ),
-        degrees=(2, 2),
-    )
+    variables = Variable(name="q", lo=-0.5, hi=1.2, angle=1), Variable(name="x", lo=-1.0, hi=3.0, angle=0)
+    chart = Chart(variables=variables, degrees=(2, 2))
 
     def function(q, x):
         return 2 * np.sin(q) * np.cos(q) * x**2 + x - 3 * np.cos(q) ** 2
@@ -193,16 +178,6 @@ def test_control_points_bound_the_polynomial_and_meet_it_at_the_ends(coefficient
     assert controls.max() >= values.max() - 1e-9
     assert controls[[0, -1]] == pytest.approx(values[[0, -1]], abs=1e-9)
     assert len(controls) == len(control_points(order, pieces)) == pieces * order + 1
-
-
-def test_control_points_converge_quadratically_to_the_polynomial():
-    coefficients = np.array([0.3, -1.0, 2.0, 0.5, -1.5])
-    fine = np.polynomial.polynomial.polyval(np.linspace(-1, 1, 4001), coefficients).min()
-    gaps = []
-    for pieces in (2, 4, 8, 16):
-        controls = control_matrix(4, pieces) @ np.linalg.solve(monomial_matrix(4), coefficients)
-        gaps.append(fine - controls.min())
-    assert gaps[-1] < gaps[0] / 30 + 1e-12
 
 
 def test_degrees_count_angles_once_and_refuse_what_is_no_polynomial():
@@ -280,19 +255,10 @@ def least(coefficients, raised=0):
     """The least value on [-1, 1] of a polynomial, by sums of squares: max r with p - r >= 0."""
     order = len(coefficients) - 1
     form = gram_form((order,), 1, raised)
-    one = np.zeros((order + 1, 1))
-    one[0] = -1
-    from scipy import sparse
-
-    entries = Affine(
-        constant=form.pivots @ np.array(coefficients),
-        slopes=(slopes := sparse.hstack([form.pivots @ one, form.free])),
-    )
-    cost = np.zeros(slopes.shape[1])
-    cost[0] = -1.0
-    return -solve(
-        ConicProgram(cost=cost, semidefinite=[SemidefiniteBlocks(orders=form.orders, entries=entries)])
-    ).objective
+    slopes = sparse.hstack([form.pivots @ -np.eye(order + 1, 1), form.free])
+    entries = Affine(constant=form.pivots @ np.array(coefficients), slopes=slopes)
+    block = SemidefiniteBlocks(orders=form.orders, entries=entries)
+    return -solve(ConicProgram(cost=-np.eye(1, slopes.shape[1])[0], semidefinite=[block])).objective
 
 
 @settings(max_examples=25, deadline=None)
@@ -324,16 +290,11 @@ def contraction_values(asked, V, states):
     ("system", "box", "degree", "states", "weight"),
     [
         (THREE_STATE, BOX_THREE, 2, lambda u: [(0.1 * u, 0.03, end) for end in (-0.1, 0.1)], lambda u: 1.0),
-        (
-            PENDULUM,
-            BOX_PENDULUM,
-            2,
-            lambda u: [(2 * np.arctan(np.tan(0.5) * u), end, 0.2) for end in (-1, 1)],
-            lambda u: ((1 + (np.tan(0.5) * u) ** 2) / (1 + np.tan(0.5) ** 2)) ** 3,
-        ),
+        (PENDULUM, BOX_PENDULUM, 2, lambda u: [(2 * np.arctan(np.tan(0.5) * u), end, 0.2) for end in (-1, 1)],
+         lambda u: ((1 + (np.tan(0.5) * u) ** 2) / (1 + np.tan(0.5) ** 2)) ** 3),
     ],
     ids=["three_state", "pendulum"],
-)
+)  # fmt: skip
 def test_conditions_are_the_matrices_they_stand_for(system, box, degree, states, weight):
     """Each polynomial, at any u, is C2's matrix at a vertex, times the angle's factor."""
     asked = problem(system, box, degree=degree, rate=0.375)
@@ -385,16 +346,6 @@ def benchmark():
 # -- proposals --------------------------------------------------------------------------------------------------------
 
 
-def test_two_state_meets_the_best_published_condition_number():
-    asked = problem(TWO_STATE, BOX_FIVE, degree=0, rate=1.742857 * (1 + 1e-5))
-    proposal = propose_sos(asked)
-    assert proposal.feasible
-    proof = verified(asked, proposal, "1.742857")
-    assert proof.verdict == "certified"
-    assert proof.upper_on_set.above / proof.lower_on_set.below <= 1.6344
-    assert proposal.kappa == pytest.approx(proof.upper_on_set.above / proof.lower_on_set.below, rel=1e-4)
-
-
 @pytest.mark.parametrize(
     ("system", "box", "degree"),
     [(TWO_STATE, BOX_FIVE, 0), (THREE_STATE, BOX_THREE, 1)],
@@ -423,29 +374,14 @@ def test_a_solver_that_returns_nothing_finite_proposes_nothing(monkeypatch, stat
             self.size = len(q)
 
         def solve(self):
-            return SimpleNamespace(
-                x=[np.nan] * self.size,
-                obj_val=1.0,
-                obj_val_dual=1.0,
-                status=status,
-                iterations=1,
-                solve_time=0.0,
-            )
+            told = {"obj_val": 1.0, "obj_val_dual": 1.0, "iterations": 1, "solve_time": 0.0}
+            return SimpleNamespace(x=[np.nan] * self.size, status=status, **told)
 
     monkeypatch.setattr(clarabel, "DefaultSolver", Liar)
     proposal = propose_sos(problem(TWO_STATE, BOX_FIVE, degree=0, rate=1.0))
     assert proposal.coefficients is None
     assert proposal.kappa == np.inf
     assert proposal.feasible is not True
-
-
-@pytest.mark.slow
-def test_three_state_at_rate_0_999_within_the_published_bounds():
-    asked = problem(THREE_STATE, BOX_THREE, degree=2, rate=0.999 * (1 + 1e-5))
-    proposal = propose_sos(asked)
-    proof = verified(asked, proposal, "0.999", digits=8)
-    assert proof.verdict == "certified"
-    assert proof.upper_on_set.above / proof.lower_on_set.below <= 0.26 / 0.17
 
 
 def test_above_the_uncontrollable_mode_there_is_nothing():
@@ -510,29 +446,6 @@ def test_state_dependent_input():
     assert proposal.feasible
     assert not asked.family.flat
     assert verified(asked, proposal, "0.3").verdict == "certified"
-
-
-@pytest.mark.slow
-def test_planar_quadrotor_with_true_sine_and_cosine():
-    """The published rate .8 and condition number (126.1 with W of degree 4, 160 with 3) nearly at degree 2, at points.
-
-    Proofs of such metrics take longer than a test may; benchmarks/synthesis.py has the larger families.
-    """
-    asked = benchmark().pvtol(degree=2, rate=0.8)
-    proposal = propose_sos(asked)
-    assert proposal.feasible
-    assert proposal.kappa < 128
-    rng = np.random.default_rng(9)
-    half = np.array([float(hi) for _, hi in asked.safe_set])
-    points = half * np.clip(rng.uniform(-1.3, 1.3, (4000, 6)), -1, 1)
-    C = contraction_values(asked, proposal.coefficients, points)
-    assert np.linalg.eigvalsh(C).min() > -1e-6
-    W = [e for row in asked.family.dual_metric(rational(proposal.coefficients)) for e in row]
-    values = Tape(W, asked.model.states).run_floats(list(points.T), (4000,)).T.reshape(-1, 6, 6)
-    spectrum = np.linalg.eigvalsh(values)
-    assert spectrum.min() > 1 - 1e-6
-    assert spectrum.max() < proposal.kappa + 1e-6
-    assert spectrum.max() > 0.97 * proposal.kappa
 
 
 def test_the_input_floor_bounds_the_input_gain():

@@ -9,6 +9,7 @@ from math import prod
 
 import numpy as np
 import pytest
+from systems import plain_model
 
 from tubecert.claims.family import Reason
 from tubecert.enclosure.branch_and_bound import Effort, supremum
@@ -16,7 +17,7 @@ from tubecert.enclosure.objective import SumOfNorms
 from tubecert.expression import constant, symbol
 from tubecert.expression.matrix import determinant
 from tubecert.expression.parse import parse
-from tubecert.model import ControlAffineModel, rank_decision
+from tubecert.model import rank_decision
 from tubecert.pipeline import Options, certify
 from tubecert.records import from_json
 from tubecert.spec import Knots, load_text
@@ -27,26 +28,15 @@ from tubecert.words.claims import message, title
 
 x, y, z = symbol("x"), symbol("y"), symbol("z")
 ZERO, ONE = constant(0), constant(1)
-LINEAR = ControlAffineModel(
-    states=("x", "y"),
-    inputs=("u",),
-    f=(y - x, -y),
-    B=((ZERO,), (ONE,)),
-    W=((ONE, ZERO), (ZERO, ONE)),
-    rate=Fraction(1, 2),
-    h=None,
-)
+EYE = ((ONE, ZERO), (ZERO, ONE))
+LINEAR = replace(plain_model(("x", "y"), ("y - x", "-y"), [["0"], ["1"]]), W=EYE, rate=Fraction(1, 2))
 
 
-def knots(*rows: str, interpolation: str = "linear") -> Knots:
+def knots(*rows: str) -> Knots:
     """Knots from lines of t, x, y, u."""
     table = [tuple(map(Fraction, row.split())) for row in rows]
-    return Knots(
-        t=tuple(row[0] for row in table),
-        x=tuple(row[1:3] for row in table),
-        u=tuple(row[3:] for row in table),
-        interpolation="hold" if interpolation == "hold" else "linear",
-    )
+    t, x, u = (tuple(row[part] for row in table) for part in (0, slice(1, 3), slice(3, None)))
+    return Knots(t=t, x=x, u=u, interpolation="linear")
 
 
 def test_a_plan_at_rest_is_no_harder_than_an_equilibrium():
@@ -170,7 +160,5 @@ def test_a_minor_that_is_not_the_only_one_refutes_nothing():
     box = [(Fraction(-1), Fraction(1)), (Fraction(1, 2), Fraction(1))]
     assert rank_decision(model, box, Effort()).verdict == "certified"
     both = replace(LINEAR, B=((x,), (y - x**2,)))
-    assert (
-        rank_decision(both, [box[0], (Fraction(-1, 8), Fraction(1))], Effort(budget=2_000)).verdict
-        == "refuted"
-    )
+    around = [box[0], (Fraction(-1, 8), Fraction(1))]
+    assert rank_decision(both, around, Effort(budget=2_000)).verdict == "refuted"

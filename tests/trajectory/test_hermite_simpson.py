@@ -9,12 +9,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from systems import plain_model
 
 from tubecert import certificate, pipeline
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.expression import constant, symbol
-from tubecert.model import ControlAffineModel
 from tubecert.recheck.document import CertificateError
 from tubecert.recheck.run import recheck
 from tubecert.report import planned
@@ -27,15 +27,7 @@ from tubecert.verdict import Verdict
 
 x, y = symbol("x"), symbol("y")
 EYE = ((constant(1), constant(0)), (constant(0), constant(1)))
-MODEL = ControlAffineModel(
-    states=("x", "y"),
-    inputs=("u",),
-    f=(y, -2 * x - y),
-    B=((constant(0),), (constant(1),)),
-    W=EYE,
-    rate=Fraction(1),
-    h=None,
-)
+MODEL = replace(plain_model(("x", "y"), ("y", "-2*x - y"), [["0"], ["1"]]), W=EYE, rate=Fraction(1))
 SPEC = """tubecert: 1
 name: collocated
 system: {states: [x, y], inputs: [u], f: [y, "-2*x - y"], B: [[0], [1]]}

@@ -143,13 +143,6 @@ trajectory: {kind: ilqr, start: [1, 0], target: [0, 0], horizon: 4}
         x = (A - B @ K) @ x
 
 
-@pytest.mark.slow
-def test_planning_is_deterministic():
-    one, two = (ilqr.plan(Dynamics(MODEL), problem(t=np.linspace(0, 5, 41))) for _ in range(2))
-    assert one.u.tobytes() == two.u.tobytes()
-    assert one.costs == two.costs
-
-
 # -- from a plan to a curve ------------------------------------------------------------------------------------
 
 
