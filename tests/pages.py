@@ -157,10 +157,3 @@ def on_paper(path, folder):
     copy = folder / f"paper-{path.name}"
     copy.write_text(source, encoding="utf-8")
     return copy
-
-
-def screenshot(path, folder, *, width: int, height: int, dark: bool = False):
-    """A picture of the upper part of the page."""
-    image = folder / f"{path.stem}-{width}-{'dark' if dark else 'light'}.png"
-    _run(folder, *_looks(width, height, dark), f"--screenshot={image}", path.as_uri())
-    return image

@@ -1,4 +1,4 @@
-"""`explain` knows every word of a report's first screen."""
+"""`explain` knows every label of a report's first screen."""
 
 import re
 from fractions import Fraction
@@ -33,22 +33,16 @@ conditions: {decides: B}
 
 WIND = 'disturbance: {E: [["0.1"], ["1 + 0.1*x"]], bound: 0.01}\n'
 FAMILY = "{kind: any, x: {x: [-0.2, 0.2], y: [-0.2, 0.2]}, u: {u: [-0.5, 0.5]}, defect: 0.001}"
+ANY = SMALL.replace("{kind: equilibrium, at: [0, 0], input: [0]}", FAMILY)
+UNCERTAIN = SMALL.replace("  f: [", "  parameters: {m: [0.97, 1.03]}\n  f: [").replace("[1]]", '["1/m"]]', 1)
 SCREENS = {
     "everything": (PLANT, "distance"),
     "0": (SMALL, "none"),
     "A, B": (SMALL, "all"),
     "B with wind": (SMALL + WIND, "distance"),
-    "an uncertain gain": (
-        SMALL.replace("  f: [", "  parameters: {m: [0.97, 1.03]}\n  f: [").replace("[1]]", '["1/m"]]', 1),
-        "distance",
-    ),
+    "an uncertain gain": (UNCERTAIN, "distance"),
     "half-widths": (SMALL.replace("{epsilon: 0.2, rho_a: 0.1}", "{half_widths: {x: 0.3}}"), "all"),
-    "a family": (
-        SMALL.replace("{kind: equilibrium, at: [0, 0], input: [0]}", FAMILY).replace(
-            "{at: [0.05, 0]}", "{within: 0.01}"
-        ),
-        "distance",
-    ),
+    "a family": (ANY.replace("{at: [0.05, 0]}", "{within: 0.01}"), "distance"),
     "undecided": (SMALL + WIND, "26"),
     "refuted": (SMALL.replace("rate: 0.8", "rate: 3"), "26"),
 }
@@ -69,18 +63,13 @@ def labels(shown):
         cells = re.split(r"\s{2,}", row.strip())
         found += [cell.removesuffix(" *") for cell in cells[: 1 + (not row.startswith("   "))]]
         found += re.findall(r"% (\S+)$", row)
-    found += re.findall(
-        r"([a-z0-9_]+) -?[\d.]+(?:e-?\d+)?(?=,|\n|$)", "".join(re.findall(r"margins: (.*\n)", shown))
-    )
+    margins = "".join(re.findall(r"margins: (.*\n)", shown))
+    found += re.findall(r"([a-z0-9_]+) -?[\d.]+(?:e-?\d+)?(?=,|\n|$)", margins)
     found += re.findall(r"^  ([a-z-]+(?: [a-z-]+){0,3}):", shown, re.MULTILINE)
-    found += [
-        name
-        for name in re.findall(r"\b([A-Za-z_]+) (?:=|<|<=) [-\d.]", shown)
-        if name not in ("for", "t", "x", "y", "z", "v", "it")
-    ]
-    return list(
-        dict.fromkeys(word.strip() for word in found if word not in ("state", "alone"))
-    )  # ends of sentences
+    named = re.findall(r"\b([A-Za-z_]+) (?:=|<|<=) [-\d.]", shown)
+    found += [name for name in named if name not in ("for", "t", "x", "y", "z", "v", "it")]
+    ends = ("state", "alone")  # of sentences
+    return list(dict.fromkeys(word.strip() for word in found if word not in ends))
 
 
 def test_every_word_of_a_comparison_of_metrics_has_a_page():
@@ -106,7 +95,7 @@ def test_every_label_of_every_first_screen_has_a_page(kind):
 
 def test_every_certificate_verdict_and_choice_of_gains_has_a_page():
     words = [*SECTIONS.values(), *(name.letter for name in NAMES), *Verdict, *ROLES.values()]
-    words += [
+    words += (
         "kappa",
         "Lyapunov",
         "contraction",
@@ -116,7 +105,7 @@ def test_every_certificate_verdict_and_choice_of_gains_has_a_page():
         "L1",
         "class",
         "predictor",
-    ]
+    )
     assert [word for word in words if not isinstance(pages.find(word), pages.WordPage)] == []
     assert [word for word in ("26a", "26b", "26c", "C1", "C2", "C3") if not pages.find(word)] == []
 

@@ -32,10 +32,9 @@ from tubecert.tube import Tube
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.timeout(280),
-    pytest.mark.skipif(
-        find_spec("distributed") is None, reason="an extra"
-    ),  # a second to import, for all tests
+    pytest.mark.skipif(find_spec("distributed") is None, reason="an extra"),  # to import it takes a second
 ]
+COMMAND = (sys.executable, "-m", "tubecert")
 NINE = Effort(gap=0.05, cheap=0, budget=700)
 OVER = ("--over", "tube.epsilon=.2:.4:6")
 
@@ -105,38 +104,19 @@ def cluster(tmp_path_factory):
         yield address, workers
 
 
-def swept(folder, *words):
-    """The exit code of a sweep in a process of its own, started in the folder of the specification."""
-    return subprocess.run(
-        [sys.executable, "-m", "tubecert", "sweep", "one.yaml", *OVER, *map(str, words)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=250,
-        check=False,
-    )
+def done_in(folder, *words):
+    """A command in a process of its own, started in the folder of the specification."""
+    told = {"capture_output": True, "text": True, "timeout": 250}
+    return subprocess.run([*COMMAND, *map(str, words)], cwd=folder, check=False, **told)
 
 
 def test_a_killed_worker_loses_nothing_and_changes_no_byte(cluster, tmp_path):
     address, workers = cluster
     (tmp_path / "one.yaml").write_text(ONE, encoding="utf-8")
-    assert swept(tmp_path, "-o", "serial").returncode == 0
-    words = [
-        sys.executable,
-        "-m",
-        "tubecert",
-        "sweep",
-        "one.yaml",
-        *OVER,
-        "-o",
-        "spread",
-        "--scheduler",
-        address,
-    ]
-    points = tmp_path / "spread/points"
-    with subprocess.Popen(
-        words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as process:
+    assert done_in(tmp_path, "sweep", "one.yaml", *OVER, "-o", "serial").returncode == 0
+    points, silent = tmp_path / "spread/points", {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    words = [*COMMAND, "sweep", "one.yaml", *OVER, "-o", "spread", "--scheduler", address]
+    with subprocess.Popen(words, cwd=tmp_path, **silent) as process:
         until(lambda: points.is_dir() and any(points.glob("*.certificate.json")))
         assert len(list(points.glob("*.certificate.json"))) < 6
         workers[0].send_signal(signal.SIGKILL)
@@ -149,7 +129,7 @@ def test_what_a_cluster_cannot_do_is_refused(cluster, tmp_path):
     text = ONE.replace("{kind: equilibrium, at: [0], horizon: 10}", "{kind: csv, file: plan.csv}")
     (tmp_path / "one.yaml").write_text(text, encoding="utf-8")
     (tmp_path / "plan.csv").write_text("t,x,u\n0,0,0\n10,0,0\n")
-    done = swept(tmp_path, "--scheduler", address)
+    done = done_in(tmp_path, "sweep", "one.yaml", *OVER, "--scheduler", address)
     assert (done.returncode, "in folders of their own" in done.stderr) == (2, True), done.stderr
     assert not (tmp_path / "one.sweep").exists()
 
@@ -181,13 +161,8 @@ def test_random_runs_on_a_cluster_are_those_of_this_machine(cluster, monkeypatch
 def test_files_are_checked_on_a_cluster(cluster, tmp_path):
     (tmp_path / "one.yaml").write_text(ONE, encoding="utf-8")
     (tmp_path / "wrong.yaml").write_text(ONE.replace("kind: equilibrium", "kind: rest"), encoding="utf-8")
-    words = [sys.executable, "-m", "tubecert", "check", "one.yaml", "wrong.yaml", "--no-cache"]
-    own = [
-        subprocess.run(
-            [*words, *more], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
-        )
-        for more in ([], ["--scheduler", cluster[0]])
-    ]
+    words = ["check", "one.yaml", "wrong.yaml", "--no-cache"]
+    own = [done_in(tmp_path, *words, *more) for more in ([], ["--scheduler", cluster[0]])]
     assert [each.returncode for each in own] == [2, 2], own
     assert own[1].stdout.replace(f"{tmp_path}/", "") == own[0].stdout
 

@@ -47,22 +47,13 @@ def run(*arguments):
 
 
 def sweep_of(folder, *over, fixed=(), **options):
-    task = Task(
-        path="one.yaml",
-        text=ONE,
-        fixed=tuple(map(Setting.of, fixed)),
-        options=Options(**options),
-        folder=folder,
-    )
+    settings = tuple(map(Setting.of, fixed))
+    task = Task(path="one.yaml", text=ONE, fixed=settings, options=Options(**options), folder=folder)
     return Sweep.of(task, [Axis.of(each) for each in over])
 
 
 def bytes_in(folder):
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def rows_of(folder):
@@ -114,10 +105,8 @@ def test_a_point_is_the_certificate_that_certify_writes(done, tmp_path):
     target = tmp_path / "c.json"
     answer = run("certify", spec, "--set", "tube.epsilon=.4", "-q", "-o", target)
     assert answer.exit_code == 0, answer.output
-    one, other = (
-        json.loads(target.read_bytes()),
-        json.loads((folder / "points/0002.certificate.json").read_bytes()),
-    )
+    files = target, folder / "points/0002.certificate.json"
+    one, other = (json.loads(path.read_bytes()) for path in files)
     for key in ("started", "seconds"):
         one["run"].pop(key)
     one["run"].pop("command")  # of this process, not of a shell
@@ -143,11 +132,8 @@ def test_what_does_not_depend_on_the_key_is_proven_once(tmp_path):
 def test_what_is_there_is_used_and_what_is_broken_or_gone_is_made_again(done, tmp_path, monkeypatch):
     folder = copied(done, tmp_path)
     before = bytes_in(folder)
-    asked = []
-    certify = pipeline.certify
-    monkeypatch.setattr(
-        pipeline, "certify", lambda spec, *a, **k: asked.append(spec) or certify(spec, *a, **k)
-    )
+    asked, certify = [], pipeline.certify
+    monkeypatch.setattr(pipeline, "certify", lambda *a, **k: asked.append(a) or certify(*a, **k))
     assert run("sweep", done[0], *OVER, "-o", folder).exit_code == 0
     assert (asked, bytes_in(folder)) == ([], before)
     first, second = folder / "points/0001.certificate.json", folder / "points/0002.certificate.json"
@@ -266,10 +252,8 @@ def test_figures_mark_every_point_that_is_not_certified(done):
         assert ("cell refuted", "refuted") in figure.legend
     dots = list(ET.fromstring(figures["sweep-adaptation_rate"].svg).iter("circle"))
     assert len(dots) == 2 * 2  # A and B, where they are certified
-    plane = SweepTable.of(
-        "one", [Axis.of("tube.epsilon=.2,.4"), Axis.of("tube.rho_a=1:9:log2")], sweep.outcomes()
-    )
-    for figure in sweep_figures(plane):
+    axes = [Axis.of("tube.epsilon=.2,.4"), Axis.of("tube.rho_a=1:9:log2")]
+    for figure in sweep_figures(SweepTable.of("one", axes, sweep.outcomes())):
         drawing = ET.fromstring(figure.svg)
         classes = [mark.get("class") or "" for mark in drawing.iter("rect")]
         colored = [mark for mark in drawing.iter("rect") if mark.find("title") is not None]
