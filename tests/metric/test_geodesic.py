@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from problems import W_CONSTANT, W_LINEAR, W_SQUARE
+from systems import plain_model
 
 from tubecert.coordinates import Fields
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.expression import as_expression, constant, cos, sin, symbol
+from tubecert.expression import as_expression, cos, sin, symbol
 from tubecert.metric.geodesic import SymbolNorm, unique_geodesics
-from tubecert.model import ControlAffineModel, build
+from tubecert.model import build
 from tubecert.pipeline import Options, certify
 from tubecert.spec import load_text
 from tubecert.trajectory import constant_plan
@@ -28,16 +29,8 @@ X, Y, Z = symbol("x"), symbol("y"), symbol("z")
 
 def model(W):
     names = ("x", "y", "z")[: len(W)]
-    last = len(W) - 1
-    return ControlAffineModel(
-        states=names,
-        inputs=("u",),
-        f=tuple(symbol(name) for name in names),
-        B=tuple((constant(int(i == last)),) for i in range(len(W))),
-        W=tuple(tuple(as_expression(e) for e in row) for row in W),
-        rate=Fraction(1),
-        h=None,
-    )
+    plain = plain_model(names, names, [*[["0"]] * (len(W) - 1), ["1"]])
+    return replace(plain, W=tuple(tuple(as_expression(e) for e in row) for row in W), rate=Fraction(1))
 
 
 def ball(system, centre, rho):

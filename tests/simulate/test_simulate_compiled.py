@@ -14,16 +14,16 @@ import numba
 import numpy as np
 import pytest
 from numba.core import caching
+from systems import matrix_of, plain_model
 
 from tubecert.expression import sin, symbol
-from tubecert.model import ControlAffineModel
 from tubecert.progress import Phase
 from tubecert.simulate.compiled import KERNELS, compiled, entry, told
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.trajectory.plan import constant_plan
 
-X, T = symbol("x1"), symbol("t")
+T = symbol("t")
 
 
 def fresh_kernel():
@@ -80,15 +80,8 @@ def test_every_file_with_a_kernel_counts_for_the_cache():
 
 
 def _of_1000_seconds(adaptation_rate):
-    model = ControlAffineModel(
-        states=("x1",),
-        inputs=("u",),
-        f=(-X,),
-        B=((2 + sin(X),),),
-        W=(((2 + sin(X)) ** 2,),),
-        rate=Fraction(1),
-        h=None,
-    )
+    W = matrix_of([["(2 + sin(x1))**2"]], ("x1",))
+    model = replace(plain_model(("x1",), ("-x1",), [["2 + sin(x1)"]]), W=W, rate=Fraction(1))
     problem = LoopProblem(
         model=model,
         plan=constant_plan([Fraction(0)], [Fraction(0)], None),

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from systems import plain_model
 
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
@@ -42,11 +43,8 @@ def drift(x):
 B2 = np.array([[0.5], [-2.0]])
 
 
-def min_norm(x, M=None, B=B2, f=drift):
-    """The QP in closed form for the plan 0, written out independently (a constant metric, f(0) = 0)."""
-    M = np.linalg.inv(W2) if M is None else M
-    phi0 = 2 * x @ M @ f(x) + 2 * RATE * x @ M @ x
-    phi1 = 2 * B.T @ M @ x
+def least(phi0, phi1):
+    """The QP in closed form."""
     return -phi0 * phi1 / (phi1 @ phi1) if phi0 > 0 else np.zeros(1)
 
 
@@ -60,48 +58,47 @@ def problem(controller, horizon=2.0, K=5, model=TWO, plan=PLAN, **options):
 
 
 def projection(s, y, gains):
-    """Proj(s, y) of the theory, smooth or hard."""
-    if gains.smooth is not None:
-        nu, R = gains.smooth, gains.projection_radius
-        F = ((1 + nu) * s @ s - R**2) / (nu * R**2)
-        return y - F * s * (s @ y) / (s @ s) if F > 0 and y @ s > 0 else y
-    hit = s @ s >= gains.projection_radius**2 * (1 - 1e-12) and y @ s > 0
-    return y - s * (s @ y) / (s @ s) if hit else y
+    """Proj(s, y) of the theory, smooth; no loop here comes to the radius of a hard one."""
+    if gains.smooth is None:
+        return y
+    nu, R = gains.smooth, gains.projection_radius
+    F = ((1 + nu) * s @ s - R**2) / (nu * R**2)
+    return y - F * s * (s @ y) / (s @ s) if F > 0 and y @ s > 0 else y
 
 
-def right_hand_side(controller, gains, h=h2):
+def loop(controller, gains, *, f, B, k, h):
     """z' in numpy: z = (x, xtilde, sigma_hat, u_a) as far as the loop has them."""
 
     def rate(t, z):
-        x = z[:2]
-        k, disturbance = min_norm(x), h(t, x)
+        b, disturbance = B(z), h(t, z)
+        own = f(t, z[:2]) + b @ k(t, z[:2])
         if controller == "nominal":
-            return drift(x) + B2 @ k
+            return own
         if controller == "ccm":
-            return drift(x) + B2 @ (k + disturbance)
+            return own + b @ disturbance
         if controller == "reference":
-            u = z[2:]
-            return np.concatenate(
-                [drift(x) + B2 @ (k + u + disturbance), -gains.bandwidth * (u + disturbance)]
-            )
+            return np.concatenate([own + b @ (z[2:] + disturbance), -gains.bandwidth * (z[2:] + disturbance)])
         xt, s, u = z[2:4], z[4:5], z[5:6]
-        ds = gains.adaptation_rate * projection(s, -B2.T @ xt, gains)
-        return np.concatenate(
-            [
-                drift(x) + B2 @ (k + u + disturbance),
-                -gains.predictor_gain * xt + B2 @ (s - disturbance),
-                ds,
-                -gains.bandwidth * (u + s),
-            ]
-        )
+        predicted = -gains.predictor_gain * xt + b @ (s - disturbance)
+        ds = gains.adaptation_rate * projection(s, -b.T @ xt, gains)
+        return np.concatenate([own + b @ (u + disturbance), predicted, ds, -gains.bandwidth * (u + s)])
 
     return rate
 
 
+def right_hand_side(controller, gains, f=lambda t, x: drift(x)):
+    """The loops of the two-state system, whose metric is constant, about the plan 0."""
+
+    def k(t, x):
+        m = np.linalg.inv(W2) @ x
+        return least(2 * m @ (f(t, x) - f(t, 0 * x)) + 2 * RATE * m @ x, 2 * B2.T @ m)
+
+    return loop(controller, gains, f=f, B=lambda x: B2, k=k, h=h2)
+
+
 def dop853(rate, z0, t, tolerance=1e-11, **options):
-    done = solve_ivp(
-        rate, (t[0], t[-1]), z0, method="DOP853", t_eval=t, rtol=tolerance, atol=tolerance, **options
-    )
+    options |= {"method": "DOP853", "t_eval": t, "rtol": tolerance, "atol": tolerance}
+    done = solve_ivp(rate, (t[0], t[-1]), z0, **options)
     assert done.success
     return done.y.T
 
@@ -207,14 +204,7 @@ SMOOTH_H = (sin(2 * T) + Fraction(3, 10) * sin(X),)
 def test_steps_have_order_four(controller, B, rate, least):
     """A system whose feedback has no kinks; Gamma such that the steps resolve the oscillation."""
     gains = LoopGains(bandwidth=5.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=rate)
-    case = LoopProblem(
-        model=scalar(STEADY, B),
-        plan=ORIGIN,
-        controller=controller,
-        horizon=4.0,
-        times=np.linspace(0, 4, 5),
-        gains=gains,
-    )
+    case = problem(controller, horizon=4.0, model=scalar(STEADY, B), plan=ORIGIN, gains=gains)
     found = levels(case, np.array([[0.5]]), SMOOTH_H, 6)
     errors = [np.abs(x - found[-1]).max() for x in found[1:4]]
     order = np.log2(errors[0] / errors[2]) / 2
@@ -225,14 +215,7 @@ def test_steps_have_order_four(controller, B, rate, least):
 def test_steps_far_longer_than_the_oscillation_are_accurate():
     """Gamma 1e10 turns 6000 rad in the longest step; the error is that of the slow part."""
     gains = LoopGains(bandwidth=5.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=1e10)
-    case = LoopProblem(
-        model=scalar(STEADY, constant(1)),
-        plan=ORIGIN,
-        controller="l1",
-        horizon=4.0,
-        times=np.linspace(0, 4, 5),
-        gains=gains,
-    )
+    case = problem("l1", horizon=4.0, model=scalar(STEADY, constant(1)), plan=ORIGIN, gains=gains)
     found = levels(case, np.array([[0.5]]), SMOOTH_H, 6)
     errors = [np.abs(x - found[-1]).max() for x in found[:4]]
     assert errors[0] < 1e-4
@@ -255,25 +238,21 @@ def slanted_rate(controller, gains):
     """The loops of the system with B = (0, 2 + sin x2): its metric is constant in (x1, flat(x2))."""
     Mz = np.linalg.inv(np.array([[1.0, -0.5], [-0.5, 1.0]]))
 
-    def rate(t, z):
-        x = z[:2]
-        b = 2 + np.sin(x[1])
-        B = np.array([[0.0], [b]])
-        f = np.array([-x[0] + x[1], 0.5 * x[0] - x[1] + 0.1 * x[0] * x[1]])
-        dz = np.array([x[0], flat(x[1])])
-        m = np.array([1.0, 1 / b]) * (Mz @ dz)
-        phi0, phi1 = 2 * m @ f + 2 * 1.5 * dz @ Mz @ dz, 2 * B.T @ m
-        k = -phi0 * phi1 / (phi1 @ phi1) if phi0 > 0 else np.zeros(1)
-        h = np.array([0.2 * np.cos(t) + 0.1 * x[0]])
-        if controller == "reference":
-            return np.concatenate([f + B @ (k + h + z[2:]), -gains.bandwidth * (z[2:] + h)])
-        xt, s, u = z[2:4], z[4:5], z[5:6]
-        ds = gains.adaptation_rate * projection(s, -B.T @ xt, gains)
-        return np.concatenate(
-            [f + B @ (k + u + h), -gains.predictor_gain * xt + B @ (s - h), ds, -gains.bandwidth * (u + s)]
-        )
+    def B(x):
+        return np.array([[0.0], [2 + np.sin(x[1])]])
 
-    return rate
+    def f(t, x):
+        return np.array([-x[0] + x[1], 0.5 * x[0] - x[1] + 0.1 * x[0] * x[1]])
+
+    def k(t, x):
+        dz = np.array([x[0], flat(x[1])])
+        m = np.array([1.0, 1 / B(x)[1, 0]]) * (Mz @ dz)
+        return least(2 * m @ f(t, x) + 2 * 1.5 * dz @ Mz @ dz, 2 * B(x).T @ m)
+
+    def h(t, x):
+        return np.array([0.2 * np.cos(t) + 0.1 * x[0]])
+
+    return loop(controller, gains, f=f, B=B, k=k, h=h)
 
 
 @pytest.mark.slow
@@ -296,8 +275,7 @@ def test_state_dependent_inputs_agree_with_dop853(controller):
 @pytest.mark.slow
 def test_lanes_do_not_know_each_other():
     """Many lanes give what each gives alone, whatever the others do; a diverging one is stopped and named."""
-    rng = np.random.default_rng(1)
-    N, n, m = 40, 2, 1
+    rng, N, n, m = np.random.default_rng(1), 40, 2, 1
     starts = rng.uniform(-0.3, 0.3, (N, n))
     starts[7] = [1e5, 1e5]
     d = Disturbance(
@@ -326,14 +304,10 @@ def test_lanes_do_not_know_each_other():
 
 
 # x1' = x2 + 0.1 x1^3 escapes in finite time from far away
-UNSTABLE = ControlAffineModel(
-    states=("x1", "x2"),
-    inputs=("u",),
-    f=(-X + Y + X**3, -Y),
-    B=((constant(0),), (constant(1),)),
+UNSTABLE = replace(
+    plain_model(("x1", "x2"), ("-x1 + x2 + x1**3", "-x2"), [["0"], ["1"]]),
     W=((constant(1), constant(0)), (constant(0), constant(1))),
     rate=Fraction(1, 10),
-    h=None,
 )
 
 
@@ -400,24 +374,7 @@ def test_an_f_that_depends_on_time_agrees_with_dop853():
     model = replace(TWO, f=(TWO.f[0] + sin(3 * T), TWO.f[1] + T * Fraction(1, 2)), time=(0, 2))
     gains = LoopGains(bandwidth=25.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=4e2)
 
-    def moved(t):
-        return lambda x: drift(x) + np.array([np.sin(3 * t), 0.5 * t])
-
-    def rate(t, z):
-        x, xt, s, u = z[:2], z[2:4], z[4:5], z[5:6]
-        M, f = np.linalg.inv(W2), moved(t)
-        phi0 = 2 * x @ M @ (f(x) - f(np.zeros(2))) + 2 * RATE * x @ M @ x
-        phi1 = 2 * B2.T @ M @ x
-        k = -phi0 * phi1 / (phi1 @ phi1) if phi0 > 0 else np.zeros(1)
-        return np.concatenate(
-            [
-                f(x) + B2 @ (k + u + h2(t, x)),
-                -gains.predictor_gain * xt + B2 @ (s - h2(t, x)),
-                gains.adaptation_rate * projection(s, -B2.T @ xt, gains),
-                -gains.bandwidth * (u + s),
-            ]
-        )
-
+    rate = right_hand_side("l1", gains, lambda t, x: drift(x) + np.array([np.sin(3 * t), 0.5 * t]))
     case = problem("l1", horizon=1.0, model=model, gains=gains)
     expected = dop853(rate, np.concatenate([START[0], np.zeros(4)]), case.times)
     found = integrate(case, START, Disturbance.from_expressions(wavy_h(), model, 1), tolerance=1e-7)

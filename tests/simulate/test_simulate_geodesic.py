@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -10,9 +11,10 @@ import numpy as np
 import pytest
 from problems import W_CONSTANT, W_LINEAR, W_SQUARE
 from scipy.integrate import solve_ivp
+from systems import plain_model
 
-from tubecert.expression import as_expression, constant, exp, sin, symbol
-from tubecert.model import ControlAffineModel, build
+from tubecert.expression import as_expression, exp, sin, symbol
+from tubecert.model import build
 from tubecert.simulate.geodesic import REASONS, UNRESOLVED, geodesic, metric
 from tubecert.spec import load_text
 
@@ -22,16 +24,8 @@ THREE = build(load_text((CONFIGS / "three_state.yaml").read_text(encoding="utf-8
 
 
 def model(W):
-    n = len(W)
-    return ControlAffineModel(
-        states=("x", "y", "z")[:n],
-        inputs=("u",),
-        f=(constant(0),) * n,
-        B=tuple((constant(int(i == n - 1)),) for i in range(n)),
-        W=tuple(tuple(as_expression(e) for e in row) for row in W),
-        rate=Fraction(1),
-        h=None,
-    )
+    plain = plain_model(("x", "y"), ("0", "0"), [["0"], ["1"]])
+    return replace(plain, W=tuple(tuple(as_expression(e) for e in row) for row in W), rate=Fraction(1))
 
 
 def solved(system, p, q, degree=5):

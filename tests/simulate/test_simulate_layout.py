@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
+from systems import matrix_of, plain_model
 
-from tubecert.expression import as_expression, sin, symbol
-from tubecert.model import ControlAffineModel
 from tubecert.simulate.compiled import entry
 from tubecert.simulate.fast import _rate, generator
 from tubecert.simulate.grid import fast_part
@@ -17,35 +17,17 @@ from tubecert.simulate.problem import LoopGains, LoopProblem
 from tubecert.spec.simulation import CONTROLLERS as NAMES
 from tubecert.trajectory import constant_plan
 
-X, Y, T = symbol("x1"), symbol("x2"), symbol("t")
-
-
-def exact(rows):
-    return tuple(tuple(as_expression(Fraction(entry)) for entry in row) for row in rows)
-
-
-TWO = ControlAffineModel(
-    states=("x1", "x2"),
-    inputs=("u1", "u2"),
-    f=(-X + Y, sin(X) - Y),
-    B=exact([["1", "1/2"], ["-1/4", "2"]]),
-    W=exact([["1", "-1/2"], ["-1/2", "1"]]),
+TWO = replace(
+    plain_model(("x1", "x2"), ("-x1 + x2", "sin(x1) - x2"), [["1", "1/2"], ["-1/4", "2"]]),
+    W=matrix_of([["1", "-1/2"], ["-1/2", "1"]], ()),
     rate=Fraction(1, 2),
-    h=None,
 )
 GAINS = LoopGains(bandwidth=7.0, projection_radius=100.0, predictor_gain=3.0, adaptation_rate=11.0)
 
 
-def problem(controller, **options):
-    return LoopProblem(
-        model=TWO,
-        plan=constant_plan([0, 0], [0, 0], None),
-        controller=controller,
-        horizon=1.0,
-        times=np.linspace(0, 1, 5),
-        gains=GAINS,
-        **options,
-    )
+def problem(controller):
+    plan, times = constant_plan([0, 0], [0, 0], None), np.linspace(0, 1, 5)
+    return LoopProblem(model=TWO, plan=plan, controller=controller, horizon=1.0, times=times, gains=GAINS)
 
 
 @entry
@@ -91,6 +73,3 @@ def test_loops_are_named_alike_everywhere():
     assert not DESIGNS["nominal"].disturbed
     assert all(DESIGNS[name].disturbed for name in CONTROLLERS if name != "nominal")
     assert all(hasattr(GAINS, need) for design in DESIGNS.values() for need in design.needs)
-
-
-# the rules of the room

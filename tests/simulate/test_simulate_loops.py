@@ -5,16 +5,16 @@ Everything is written here a second time in numpy, from the theory: plan, feedba
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from systems import F_TWO, W_TWO, matrix_of, plain_model
 
 from tubecert.expression import cos, sin, symbol
-from tubecert.expression.matrix import constants
 from tubecert.model import ControlAffineModel
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
@@ -40,15 +40,7 @@ class System:
 
 def system(states, *, f, B, W, rate, h):
     rows, weights = (np.array([[float(Fraction(e)) for e in row] for row in part]) for part in (B, W))
-    model = ControlAffineModel(
-        states=states,
-        inputs=tuple(f"u{j}" for j in range(rows.shape[1])),
-        f=f[0],
-        B=constants([[Fraction(e) for e in row] for row in B]),
-        W=constants([[Fraction(e) for e in row] for row in W]),
-        rate=Fraction(rate),
-        h=None,
-    )
+    model = replace(plain_model(states, f[0], B), W=matrix_of(W, ()), rate=Fraction(rate))
     M = np.linalg.inv(weights)
     return System(model=model, h_terms=h[0], f=f[1], h=h[1], B=rows, M=M, rate=float(Fraction(rate)))
 
@@ -56,18 +48,18 @@ def system(states, *, f, B, W, rate, h):
 ONE_INPUT = system(
     ("x1", "x2"),
     f=(
-        (-X + 2 * Y, -Fraction(1, 4) * Y**3 - 3 * X + 4 * Y),
+        F_TWO,
         lambda x: np.array([-x[0] + 2 * x[1], -0.25 * x[1] ** 3 - 3 * x[0] + 4 * x[1]]),
     ),
     B=[["1/2"], ["-2"]],
-    W=[["4.25828", "-0.93423"], ["-0.93423", "3.76692"]],
+    W=W_TWO,
     rate="1.74",
     h=((2 * sin(2 * T) + Fraction(1, 10) * X,), lambda t, x: np.array([2 * np.sin(2 * t) + 0.1 * x[0]])),
 )
 TWO_INPUTS = system(
     ("x1", "x2", "x3"),
     f=(
-        (-X + Y, sin(X) - Y + Z, X * Y - Fraction(1, 2) * Z),
+        ("-x1 + x2", "sin(x1) - x2 + x3", "x1*x2 - 1/2*x3"),
         lambda x: np.array([-x[0] + x[1], np.sin(x[0]) - x[1] + x[2], x[0] * x[1] - 0.5 * x[2]]),
     ),
     B=[["0", "0"], ["1", "1/2"], ["-1/4", "2"]],
@@ -105,12 +97,8 @@ def hermite(case, t, x, u):
         length = t[k + 1] - t[k]
         s = (now - t[k]) / length
         a, b = (case.f(z) + case.B @ u[k] for z in (x[k], x[k + 1]))
-        return (
-            (1 + 2 * s) * (1 - s) ** 2 * x[k]
-            + s * (1 - s) ** 2 * length * a
-            + s**2 * (3 - 2 * s) * x[k + 1]
-            - s**2 * (1 - s) * length * b
-        )
+        ends = (1 + 2 * s) * (1 - s) ** 2 * x[k] + s**2 * (3 - 2 * s) * x[k + 1]
+        return ends + s * (1 - s) ** 2 * length * a - s**2 * (1 - s) * length * b
 
     return at
 
@@ -198,16 +186,8 @@ class Reference:
         smooth = {"max_step": 1e-3} if self.controller == "l1" and not hard else {}
         while a < b:
             events = ([leaves] if self.sliding else [meets]) if hard else None
-            done = solve_ivp(
-                self.derivative(k),
-                (a, b),
-                z,
-                method="DOP853",
-                rtol=1e-10,
-                atol=1e-11,
-                events=events,
-                **smooth,
-            )
+            accurate = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-11, "events": events, **smooth}
+            done = solve_ivp(self.derivative(k), (a, b), z, **accurate)
             assert done.success
             a, z = done.t[-1], done.y[:, -1].copy()
             if done.status == 1:
@@ -222,14 +202,9 @@ def compared(case, loop, inputs, *, span, K, tolerance=1e-7):
     controller, gains = loop
     knots = course(case, inputs, span)
     horizon = float(knots[0][-1])
-    times = np.linspace(0, horizon, K)
+    times, plan = np.linspace(0, horizon, K), planned(case, *knots)
     problem = LoopProblem(
-        model=case.model,
-        plan=planned(case, *knots),
-        controller=controller,
-        horizon=horizon,
-        times=times,
-        gains=gains,
+        model=case.model, plan=plan, controller=controller, horizon=horizon, times=times, gains=gains
     )
     start = knots[1][0] + np.linspace(0.2, -0.1, len(case.B))
     disturbance = Disturbance.from_expressions(case.h_terms, case.model, 1)
@@ -263,6 +238,15 @@ def test_inputs_that_jump_at_knots(controller, gains):
 
 
 PAIRS = [np.array(u) for u in ((0.3, -0.2), (-0.4, 0.5), (0.2, 0.1))]
+
+
+@pytest.mark.slow
+def test_one_input_whose_estimate_comes_to_its_ends():
+    gains = LoopGains(bandwidth=10.0, projection_radius=1.0, predictor_gain=2.0, adaptation_rate=400.0)
+    found, expected = compared(ONE_INPUT, ("l1", gains), JUMPS, span=0.3, K=41)
+    agree(found, expected, fast=1e-5)
+    assert 5 < (np.abs(found.sigma_hat) > 1 - 1e-9).sum() < 41
+    assert np.abs(found.sigma_hat).max() <= 1 + 1e-9
 
 
 @pytest.mark.slow

@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from simulated import setting
+from systems import matrix_of, plain_model
 
-from tubecert.expression import as_expression, exp, symbol
-from tubecert.model import ControlAffineModel
+from tubecert.expression import exp, symbol
 from tubecert.report.simulation import report, verdict_line
 from tubecert.simulate.campaign import simulate
 from tubecert.simulate.compare import compare
@@ -20,21 +20,15 @@ from tubecert.simulate.summary import summary
 from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.trajectory import constant_plan
 
-T, X, Y = symbol("t"), symbol("x1"), symbol("x2")
+T = symbol("t")
 PLAN = constant_plan([0, 0], [0], None)
 
 
 def loop(*, horizon=6.0, limit=np.inf):
-    rows = ((as_expression(0),), (as_expression(1),))
-    W = (
-        (as_expression(1), as_expression(Fraction(-1, 2))),
-        (as_expression(Fraction(-1, 2)), as_expression(1)),
-    )
-    model = ControlAffineModel(
-        states=("x1", "x2"), inputs=("u",), f=(Y, -X - Y), B=rows, W=W, rate=Fraction(2, 5), h=None
-    )
+    W = matrix_of([["1", "-1/2"], ["-1/2", "1"]], ())
+    plain = plain_model(("x1", "x2"), ("x2", "-x1 - x2"), [["0"], ["1"]])
     return LoopProblem(
-        model=model,
+        model=replace(plain, W=W, rate=Fraction(2, 5)),
         plan=PLAN,
         controller="ccm",
         horizon=horizon,
