@@ -628,6 +628,7 @@ def _tampered(change):
         ('{"result": {"a": NaN}, "format": "tubecert-certificate/3"}', "it holds NaN"),
         ("[" * 100_000, "it is nested too deeply"),
         ("\x00", "it is not JSON"),
+        ('{"format": "x", "format": "tubecert-certificate/3"}', "occurs twice"),
     ],
 )  # fmt: skip
 def test_what_is_no_certificate_is_refused(folder, text, words):

@@ -52,21 +52,13 @@ def value(text):
 LEAF = st.sampled_from(["x1", "x2", "omega", "mass_cart", "q", "2", "0.25", "3e-2", "1", "pi"])
 
 
+PAIRS = ("({} + {})", "({} - {})", "({})*({})", "{}*{}", "({})/(3 + abs({}))", "norm({}, {})")
+ALONE = ("-({})", "-{}", "({})**2", "sin({})", "sqrt(1 + abs({}))")
+
+
 def grown(inner):
-    pair = st.tuples(inner, inner)
-    return st.one_of(
-        pair.map("({0[0]} + {0[1]})".format),
-        pair.map("({0[0]} - {0[1]})".format),
-        pair.map("({0[0]})*({0[1]})".format),
-        pair.map("{0[0]}*{0[1]}".format),
-        pair.map("({0[0]})/(3 + abs({0[1]}))".format),
-        inner.map("-({})".format),
-        inner.map("-{}".format),
-        inner.map("({})**2".format),
-        inner.map("sin({})".format),
-        inner.map("sqrt(1 + abs({}))".format),
-        pair.map("norm({0[0]}, {0[1]})".format),
-    )
+    of_two = st.tuples(st.sampled_from(PAIRS), inner, inner)
+    return (of_two | st.tuples(st.sampled_from(ALONE), inner)).map(lambda own: own[0].format(*own[1:]))
 
 
 @pytest.mark.slow
@@ -106,6 +98,4 @@ def test_long_sums_go_on_below_and_nothing_of_them_is_lost():
     assert len(rows) > 5
     assert [each.text for each in found.iter("mn") if each.text != "1"] == [str(k) for k in range(2, 30)]
     assert [len(line[0]) for line in rows] == [2] + [0] * (len(rows) - 1), "the left side stands once"
-    assert all(line[1][0][0].text == "\u2212" for line in rows[1:]), (
-        "a line that goes on begins with its sign"
-    )
+    assert all(line[1][0][0].text == "\u2212" for line in rows[1:]), "what goes on begins with its sign"

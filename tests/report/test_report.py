@@ -19,12 +19,7 @@ from tubecert.records import to_json
 from tubecert.report import console, findings
 from tubecert.report.terminal import Terminal
 
-RESULTS = {
-    "certified": certified,
-    "refuted": refuted_metric,
-    "refuted gains": refuted_gains,
-    "undecided": undecided,
-}
+RESULTS = (certified, refuted_metric, refuted_gains, undecided)
 ANSI = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -38,9 +33,8 @@ def terminal(*, width=100, colored=False):
 
 
 def shown(result, *, verbose=False, **looks):
-    report = console.report(
-        Certificate.from_json(seal(result, {})), target="out/pendulum.certificate.json", verbose=verbose
-    )
+    read = Certificate.from_json(seal(result, {}))
+    report = console.report(read, target="out/pendulum.certificate.json", verbose=verbose)
     return terminal(**looks).text(report)
 
 
@@ -48,7 +42,7 @@ def line(result):
     return terminal().text(console.verdict_line(Result.from_json(result))).rstrip("\n")
 
 
-@pytest.mark.parametrize("make", RESULTS.values(), ids=RESULTS.keys())
+@pytest.mark.parametrize("make", RESULTS)
 @pytest.mark.parametrize("verbose", [False, True])
 @pytest.mark.parametrize("width", [80, 100, 120])
 def test_plain_text_is_plain(make, verbose, width):
@@ -61,7 +55,7 @@ def test_plain_text_is_plain(make, verbose, width):
     assert max(map(len, below_the_verdict)) <= width
 
 
-@pytest.mark.parametrize("make", RESULTS.values(), ids=RESULTS.keys())
+@pytest.mark.parametrize("make", RESULTS)
 def test_colour_changes_nothing_but_colour(make):
     colored = shown(make(), verbose=True, colored=True)
     assert "\x1b[" in colored
@@ -194,20 +188,11 @@ def test_findings_are_printed_as_they_are_and_counted():
 
 
 def test_findings_as_data():
-    assert to_json(findings.as_data(finding())) == {
-        "code": "TC109",
-        "severity": "error",
-        "message": "^ is not allowed",
-        "file": "plant.yaml",
-        "line": 3,
-        "column": 5,
-        "help": "write **",
-    }
-    assert to_json(findings.as_data(Finding(code="TC100", message="no"))) == {
-        "code": "TC100",
-        "severity": "error",
-        "message": "no",
-    }
+    bare = {"code": "TC100", "severity": "error", "message": "no"}
+    assert to_json(findings.as_data(Finding(code="TC100", message="no"))) == bare
+    place = {"file": "plant.yaml", "line": 3, "column": 5, "help": "write **"}
+    own = {"code": "TC109", "severity": "error", "message": "^ is not allowed", **place}
+    assert to_json(findings.as_data(finding())) == own
 
 
 # terminal

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from io import StringIO
 
 import pytest
@@ -102,9 +101,3 @@ def test_a_lock_without_limits_is_not_met():
     text = ONE + "expect: {inputs: [0, 1]}\n"
     (finding,) = compared(load_text(text), outcome(certificate_of(text).result))
     assert finding.code == "TC503"
-
-
-@pytest.mark.slow
-def test_what_is_read_back_is_what_was_written():
-    made = proven(ONE + "limits: {u: [-1, 0.25]}\n", conditions="distance")
-    assert json.loads(json.dumps(Certificate.from_json(made).to_json())) == made

@@ -32,20 +32,18 @@ def about(start, **changes):
     return Result.from_json(data)
 
 
+def box(angle, speed):
+    return {"box": {"angle": angle, "speed": [speed, speed]}}
+
+
 STARTS = {
     "rest": ({"at": ["0", "0"]}, "at 0"),
     "point": ({"at": ["1/3", "0"]}, "at angle = 1/3 rad, all else 0"),
     "every state": ({"at": ["0.1", "-2"]}, "at angle = 0.1 rad, speed = -2 rad/s"),
-    "box": (
-        {"box": {"angle": ["-0.1", "0.1"], "speed": ["0", "0"]}},
-        "anywhere with angle in [-0.1, 0.1] rad, all else 0",
-    ),
-    "box and point": (
-        {"box": {"angle": ["-0.1", "0.1"], "speed": ["1", "1"]}},
-        "anywhere with angle in [-0.1, 0.1] rad, speed = 1 rad/s",
-    ),
+    "box": (box(["-0.1", "0.1"], "0"), "anywhere with angle in [-0.1, 0.1] rad, all else 0"),
+    "box and point": (box(["-0.1", "0.1"], "1"), "anywhere with angle in [-0.1, 0.1] rad, speed = 1 rad/s"),
     "a point with pi": (
-        {"box": {"angle": [f"{SIXTH_OF_PI}6", f"{SIXTH_OF_PI}7"], "speed": ["0", "0"]}},
+        box([f"{SIXTH_OF_PI}6", f"{SIXTH_OF_PI}7"], "0"),
         "at angle = 0.523598775598 rad, all else 0",
     ),
     "ball": ({"within": "0.05"}, "within 0.05 of the start of the plan"),

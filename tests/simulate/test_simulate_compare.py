@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -11,22 +12,30 @@ from simulated import FLAT, Failure, Peak, certified, runs, setting
 
 from tubecert.certificate.result import Recipes
 from tubecert.errors import TubecertError
-from tubecert.simulate.certified import read_numbers
+from tubecert.simulate.certified import Section, Values, read_numbers
 from tubecert.simulate.compare import check_class, compare
+from tubecert.simulate.inputs import InputRange
 from tubecert.simulate.promise import KINDS, Decay, promise
+from tubecert.simulate.uncertainty import class_of
 from tubecert.spec import load_text
+from tubecert.spec.types import Output
 from tubecert.verdict import Verdict
 
 T = np.linspace(0, 4, 81)
 
 
-def quiet_runs(lanes=2, share=0.5, name="flat"):
-    """Runs that use `share` of the tube for a moment; d is taken to be exactly sqrt(a) |x|."""
-    where = setting(name)
-    pulse = share * np.exp(-((T - 2) ** 2))
+def quiet_runs(share=0.5, *, lanes=2, of_distance=None, sign=1):
+    """Runs that use `share` of the tube for a moment; d is taken to be exactly sqrt(a) |x|, or of another share."""
+    where = setting("flat")
+    pulse = np.exp(-((T - 2) ** 2))
     x = np.zeros((lanes, len(T), 2))
-    x[:, :, 1] = where.rho * pulse
-    return runs(T, x, np.broadcast_to(where.reach * pulse, (lanes, len(T))).copy())
+    x[:, :, 1] = sign * where.rho * share * pulse
+    return runs(T, x, np.broadcast_to(where.reach * (of_distance or share) * pulse, (lanes, len(T))).copy())
+
+
+def promised(**changes):
+    """What is certified of the loop, with some of it replaced."""
+    return replace(promise(setting("flat").certified, KINDS["distance"]), **changes)
 
 
 def broken(found):
@@ -89,83 +98,97 @@ def test_only_certified_sections_promise():
 
 
 def test_what_keeps_every_promise_breaks_none():
-    where = setting("flat")
-    promised = replace(promise(where.certified, KINDS["distance"]), decay=None)
-    found = compare(where, quiet_runs(), promised)
+    found = compare(setting("flat"), quiet_runs(), promised(decay=None))
     assert not found.violations
     assert not found.outside
     assert found.uses["deviation"].share == pytest.approx(0.5)
 
 
 def test_leaving_the_tube_is_noticed_with_and_without_a_promise():
-    where = setting("flat")
-    outside = quiet_runs(share=1.02)
+    where, outside = setting("flat"), quiet_runs(1.02)
     assert compare(where, outside, None).outside == (0, 1)
     assert not compare(where, outside, None).violations
-    assert {"tube", "deviation"} <= broken(
-        compare(where, outside, promise(where.certified, KINDS["distance"]))
-    )
+    assert {"tube", "deviation"} <= broken(compare(where, outside, promised()))
+    assert compare(where, quiet_runs(of_distance=1.02), None).outside == (0, 1)
 
 
 def test_the_decaying_bound_is_checked_at_every_time():
-    where = setting("flat")
-    promised = promise(where.certified, KINDS["distance"])
-    early = quiet_runs()
+    where, early = setting("flat"), quiet_runs()
     early.distance[1, 0] = 0.9 * where.reach  # far below dbar, but more than D(0) = d0
-    assert "D(t)" in broken(compare(where, early, promised))
+    assert "D(t)" in broken(compare(where, early, promised()))
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_half_widths_count_to_both_sides(sign):
+    where = setting("flat")
+    narrow = promised(half_widths=(1.0, 0.4 * where.rho), decay=None)
+    assert broken(compare(where, quiet_runs(sign=sign), narrow)) == {"half-width of v"}
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("width", "expected"), [(1.01, set()), (0.99, {"half-width of both"})])
+def test_outputs_keep_to_their_half_widths(sign, width, expected):
+    """2 v goes to rho and back."""
+    where = setting("flat")
+    both = (Output(name="both", row=(Fraction(1), Fraction(2))),)
+    where = replace(where, spec=replace(where.spec, outputs=both))
+    own = promise(replace(where.certified, output_widths=(width * where.rho,)), KINDS["distance"])
+    own = replace(own, half_widths=(1.0, where.rho), decay=None)
+    assert broken(compare(where, quiet_runs(sign=sign), own)) == expected
 
 
 @pytest.mark.parametrize("name", ["k", "u", "xtilde", "sigma_error"])
 def test_every_other_bound_is_checked(name):
-    where = setting("flat")
-    promised = replace(promise(where.certified, KINDS["distance"]), decay=None)
-    bound = promised.bounds[name]
+    own = promised(decay=None)
     for factor, expected in ((0.99, set()), (1.01, {name})):
-        peak = Peak(value=np.array([0.0, factor * bound]), time=np.array([0.0, 1.5]))
+        peak = Peak(value=np.array([0.0, factor * own.bounds[name]]), time=np.array([0.0, 1.5]))
         given = quiet_runs()
         given = replace(given, worst=replace(given.worst, **{name: peak}))
-        found = compare(where, given, promised)
+        found = compare(setting("flat"), given, own)
         assert broken(found) == expected
         assert all((item.lane, item.time) == (1, 1.5) for item in found.violations)
 
 
-def test_a_bound_is_broken_only_beyond_the_error_of_the_run():
+@pytest.mark.parametrize(("least", "expected"), [(-0.9, set()), (-1.1, {"input -u"})])
+def test_inputs_stay_in_their_ranges(least, expected):
+    own = promised(ranges=(InputRange(name="u", column=0, least=-1.0, greatest=2.0),), decay=None)
+    found = replace(quiet_runs(lanes=1), least=np.array([[least]]), greatest=np.array([[1.0]]))
+    compared = compare(setting("flat"), found, own)
+    assert broken(compared) == expected
+    assert (compared.inputs[0].least, compared.inputs[0].proven) == (least, (-1.0, 2.0))
+
+
+@pytest.mark.parametrize(("share", "outside"), [(1.004, ()), (1.007, (0, 1))])
+def test_a_bound_is_broken_only_beyond_the_error_of_the_run(share, outside):
     where = setting("flat")
-    promised = replace(promise(where.certified, KINDS["distance"]), decay=None)
-    slightly = replace(quiet_runs(share=1.004), error=np.full(2, 0.005 * where.rho))
-    assert not compare(where, slightly, promised).outside
-    surely = replace(quiet_runs(share=1.007), error=np.full(2, 0.005 * where.rho))
-    assert compare(where, surely, promised).outside == (0, 1)
+    given = replace(quiet_runs(share), error=np.full(2, 0.005 * where.rho))
+    assert compare(where, given, promised(decay=None)).outside == outside
 
 
 def test_a_large_error_is_no_result():
     where = setting("flat")
-    doubtful = replace(quiet_runs(share=3.0), error=np.array([0.0, 0.011 * where.rho]))
-    found = compare(where, doubtful, promise(where.certified, KINDS["distance"]))
+    doubtful = replace(quiet_runs(3.0), error=np.array([0.0, 0.011 * where.rho]))
+    found = compare(where, doubtful, promised())
     assert found.unreliable == (1,)
     assert found.outside == (0,)
     assert all(item.lane == 0 for item in found.violations)
 
 
-def test_a_run_that_diverges_has_left_the_tube():
-    where = setting("flat")
-    far = quiet_runs(share=30.0)
-    stopped = replace(
-        far, error=np.array([0.0, np.inf]), failures=(Failure(lane=1, t=2.5, reason="the state diverges"),)
-    )
-    found = compare(where, stopped, promise(where.certified, KINDS["distance"]))
-    assert 1 in found.outside
-    assert any((item.name, item.lane, item.time) == ("tube", 1, 2.5) for item in found.violations)
+@pytest.mark.parametrize(("share", "left"), [(1.9, False), (2.1, True), (30.0, True)])
+def test_a_run_that_is_stopped_has_left_the_tube_beyond_two_radii(share, left):
+    where, failures = setting("flat"), (Failure(lane=1, t=2.5, reason="the state diverges"),)
+    stopped = replace(quiet_runs(share), error=np.array([0.0, np.inf]), failures=failures)
+    assert (1 in compare(where, stopped, None).outside) is left
+    told = [(item.name, item.lane, item.time) for item in compare(where, stopped, promised()).violations]
+    assert (("tube", 1, 2.5) in told) is left
 
 
 def test_settling_is_measured():
     where = setting("flat")
-    promised = replace(promise(where.certified, KINDS["distance"]), ultimate=0.25 * where.rho)
-    settled = compare(where, quiet_runs(), promised).settled
+    settled = compare(where, quiet_runs(), promised(ultimate=0.25 * where.rho)).settled
     assert settled is not None
     assert 0.5 * np.exp(-((settled - 2) ** 2)) <= 0.25 < 0.5 * np.exp(-((settled - 2 - 0.1) ** 2)) * 2
-    never = replace(promised, ultimate=1e-3 * where.rho)
-    assert compare(where, quiet_runs(share=0.5), never).settled is None
+    assert compare(where, quiet_runs(), promised(ultimate=1e-3 * where.rho)).settled is None
 
 
 def h_of(text):
@@ -195,5 +218,66 @@ def test_an_uncertainty_outside_its_class_is_an_error(text, what):
 def test_an_uncertainty_in_its_class_passes_and_may_leave_it_after_the_tube_is_left():
     where = setting("flat")
     check_class(where, quiet_runs(), h_of("0.2*sin(t)"), "uncertainty.h")
-    outside = quiet_runs(share=50.0)
+    outside = quiet_runs(50.0)
     check_class(where, outside, h_of("0.2*sin(t)*(1 + 0*p)"), "uncertainty.h")
+
+
+# every number of a promise and of a class, written a second time from the theory
+
+
+@pytest.fixture
+def numbers():
+    """A certificate by hand, whose constants are all different."""
+    own = read_numbers(certified("flat")[1])
+    names = (
+        "feedback_gain u_star h h_t h_x h_initial prediction_error initial_distance metric_input_gain B B_x B_pinv "
+        "B_pinv_x plan_defect plan_defect_metric drift_on_plan M_x"
+    )
+    constants = Values({name: 0.3 + 0.11 * i for i, name in enumerate(names.split())})
+    alone = Section(
+        certified=True, recipe=Values(), ultimate=None
+    )  # its class is too large for one of its own
+    sections = {**own.sections, "no_adaptation": alone}
+    return replace(own, rho=0.7, reach=0.4, upper=1.9, constants=constants, sections=sections)
+
+
+@pytest.mark.parametrize("key", list(KINDS))
+def test_bounds_are_those_of_the_theory(numbers, key):
+    c, recipe = numbers.constants, numbers.sections[KINDS[key].name.key].recipe
+    kmax = c["feedback_gain"] * 0.4
+    R_H = recipe["projection_radius"] if KINDS[key].name.adapts else 0.0
+    expected = {
+        "distance": 0.4,
+        "deviation": 0.7,
+        "k": kmax,
+        "u": c["u_star"] + kmax + R_H,
+        "sigma_error": c["h"] + R_H,
+    }
+    if key == "none":
+        del expected["sigma_error"]
+    if key == "26":
+        expected["xtilde"] = c["prediction_error"] / recipe["adaptation_rate"] ** 0.5
+    if key == "distance":
+        s1, q = c["h_t"] + c["h_x"] * recipe["speed"], 2 * recipe["predictor_gain"]
+        V = (2 * (c["h"] + R_H) * s1 / q + (c["h"] + R_H) ** 2) / recipe["adaptation_rate"]  # (2.11)
+        expected["xtilde"] = V**0.5
+    assert promise(numbers, KINDS[key]).bounds == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_decay_without_adaptation(numbers):
+    c, t = numbers.constants, np.linspace(0, 5, 50)
+    pushed = (c["metric_input_gain"] * c["h"] + c["plan_defect_metric"]) / numbers.rate
+    expected = pushed + (c["initial_distance"] - pushed) * np.exp(-numbers.rate * t)
+    assert promise(numbers, KINDS["none"]).decay(t) == pytest.approx(expected, rel=1e-12)
+
+
+def test_pushes_are_bounded_where_metric_and_inputs_are_constant(numbers):
+    """B'M gamma_s changes with x by |B| A, with t by |B| A |x*'|, and |x*'| <= |f + B u*| + |p|."""
+    assert class_of(numbers, 2, 1).push is None
+    c = numbers.constants
+    c["M_x"] = c["B_x"] = 0.0
+    slope = c["B"] * 1.9
+    assert class_of(numbers, 2, 1).push == pytest.approx(
+        (slope, slope * (c["drift_on_plan"] + c["plan_defect"]))
+    )
+    assert class_of(replace(numbers, upper=None), 2, 1).push is None

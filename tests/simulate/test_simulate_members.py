@@ -45,16 +45,20 @@ def followed(count, each, choice=None, *, seconds=1, replan=None, plans=None):
     return setting, follow(setting, [loop], plans, asked=count - 1, each=each, seed=3)
 
 
+def is_of_the_family(knots, spec):
+    table = Table(file="drawn.csv", sha256="", knots=knots)
+    trajectory = replace(spec.trajectory, kind="csv", bundle=None, table=table, horizon=knots.t[-1])
+    (finding,) = membership(replace(spec, trajectory=trajectory), spec, "drawn")
+    assert finding.severity is Severity.NOTE, finding.message
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 1])
 def test_what_is_drawn_is_proven_to_be_of_the_family(number):
     """The proof is that of `check --family`, which knows nothing of how plans are drawn."""
     spec = load_text(FAMILY)
     plan = member(drawing_of(spec, build(spec), 2.0), 7, number)
-    table = Table(file="drawn.csv", sha256="", knots=plan.data)
-    trajectory = replace(spec.trajectory, kind="csv", bundle=None, table=table, horizon=Fraction(2))
-    (finding,) = membership(replace(spec, trajectory=trajectory), spec, "drawn")
-    assert finding.severity is Severity.NOTE, finding.message
+    is_of_the_family(plan.data, spec)
     x = np.array(plan.data.x, dtype=float)
     assert np.ptp(x, axis=0).max() > 0.2  # it goes somewhere
 
@@ -100,15 +104,16 @@ def test_a_family_whose_plans_cannot_be_kept_to_is_told(monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_certified_loop_keeps_to_every_plan():
-    setting, found = followed(4, 2)
+@pytest.mark.parametrize("replan", [None, Fraction(1, 4)])
+def test_the_certified_loop_keeps_to_every_plan_and_to_those_given_up_for_others(replan):
+    setting, found = followed(4, 2, replan=replan)
     assert (found.plans, found.each) == (3, 2)
     (loop,) = found.followed
     assert loop.comparison.count == 6
     assert not loop.comparison.outside
     assert not loop.comparison.violations
     assert loop.comparison.uses["distance"].bound <= setting.reach
-    assert 0.005 < found.defect <= 0.01
+    assert (0.005 if replan is None else 0) < found.defect <= 0.01
     data = json.loads(json.dumps(to_json(members_data(found))))
     assert data["loops"][0]["runs"] == 6
     assert data["largest_defect"] == found.defect
@@ -125,9 +130,8 @@ def test_gains_that_are_too_small_leave_some_tube():
 
 def test_runs_along_several_plans_are_numbered_through():
     use = Use(value=0.5, bound=1.0, lane=0, time=0.1)
-    own = Comparison(
-        count=2, uses={"distance": use}, violations=(), outside=(), unreliable=(), error=0.0, settled=0.0
-    )
+    none = dict.fromkeys(("violations", "outside", "unreliable"), ())
+    own = Comparison(count=2, uses={"distance": use}, error=0.0, settled=0.0, **none)
     more = replace(own, uses={"distance": replace(use, value=0.7, lane=1)}, outside=(0,), first_exit=(0, 1.5))
     found = merged([own, more, replace(more, first_exit=(1, 0.5), outside=(1,), settled=0.2)])
     assert found.count == 6
@@ -168,21 +172,7 @@ def test_every_plan_of_a_planner_is_proven_to_be_of_the_family():
     plan = member(drawing_of(spec, build(spec), 0.5, Fraction(1, 4)), 7, 2)
     knots = plan.parts[1].data
     assert knots.x[0] == plan.parts[0].data.x[len(plan.parts[0].data.t) // 2]
-    table = Table(file="drawn.csv", sha256="", knots=knots)
-    trajectory = replace(spec.trajectory, kind="csv", bundle=None, table=table, horizon=knots.t[-1])
-    (finding,) = membership(replace(spec, trajectory=trajectory), spec, "drawn")
-    assert finding.severity is Severity.NOTE, finding.message
-
-
-@pytest.mark.slow
-def test_the_certified_loop_keeps_to_plans_that_are_given_up_for_others():
-    setting, found = followed(4, 2, replan=Fraction(1, 4))
-    (loop,) = found.followed
-    assert loop.comparison.count == 6
-    assert not loop.comparison.outside
-    assert not loop.comparison.violations
-    assert loop.comparison.uses["distance"].bound <= setting.reach
-    assert found.defect <= 0.01
+    is_of_the_family(knots, spec)
 
 
 @pytest.mark.slow

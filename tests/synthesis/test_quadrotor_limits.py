@@ -13,8 +13,6 @@ import sympy as sp
 from oracle import optimum
 
 from tubecert.synthesis import cegis
-from tubecert.synthesis.family import metric_family
-from tubecert.synthesis.problem import SynthesisProblem
 
 T, phi, theta = sp.symbols("T phi theta")
 VDOT = sp.Matrix([-T * sp.sin(theta), T * sp.cos(theta) * sp.sin(phi), -T * sp.cos(theta) * sp.cos(phi)])
@@ -24,21 +22,13 @@ THRUSTS = (sp.Rational("4.9033"), sp.Rational("19.6132"))
 def exact_slopes(half_tangent):
     """G at thrusts from g/2 to 2 g and tilts of -a, 0, a, tan(a/2) = `half_tangent`: rational matrices."""
     h = sp.Rational(half_tangent)
-    circle = {
-        k: (2 * k * h / (1 + h**2) if k else sp.Integer(0), (1 - h**2) / (1 + h**2) if k else 1)
-        for k in (-1, 0, 1)
-    }
+    turned = {k: (2 * k * h / (1 + h**2), (1 - h**2) / (1 + h**2)) for k in (-1, 1)}
+    circle = {0: (sp.Integer(0), sp.Integer(1)), **turned}
     G = VDOT.jacobian([T, phi, theta])
     slopes = []
     for thrust, i, j in product(THRUSTS, (-1, 0, 1), (-1, 0, 1)):
-        values = {
-            sp.sin(phi): circle[i][0],
-            sp.cos(phi): circle[i][1],
-            sp.sin(theta): circle[j][0],
-            sp.cos(theta): circle[j][1],
-            T: thrust,
-        }
-        slopes.append(G.subs(values))
+        functions = (sp.sin(phi), sp.cos(phi), sp.sin(theta), sp.cos(theta), T)
+        slopes.append(G.subs(dict(zip(functions, (*circle[i], *circle[j], thrust), strict=True))))
     return slopes
 
 
@@ -52,10 +42,8 @@ def certificate(slopes):
     conditions = [*(z >> t * np.eye(3) for z in Z), sum(cp.trace(z) for z in Z) == 1, total == 0]
     task = cp.Problem(cp.Maximize(t), conditions)
     assert optimum(task) is not None
-    rounded = [
-        sp.Matrix(3, 3, [sp.Rational(Q(float(x)).limit_denominator(10**7)) for x in z.value.flat]) for z in Z
-    ]
-    rounded = [(z + z.T) / 2 for z in rounded]
+    near = [[sp.Rational(Q(float(x)).limit_denominator(10**7)) for x in z.value.flat] for z in Z]
+    rounded = [(z + z.T) / 2 for z in (sp.Matrix(3, 3, entries) for entries in near)]
     # the rounding error of the sum is taken out exactly, by the least change of all Z_i
     i, j = np.triu_indices(3)
     units = []
@@ -66,12 +54,8 @@ def certificate(slopes):
     rows = sp.Matrix.hstack(*[(unit * G).reshape(9, 1) for G in slopes for unit in units])
     error = sum((z * G for z, G in zip(rounded, slopes, strict=True)), start=sp.zeros(3, 3)).reshape(9, 1)
     change = rows.T * (rows * rows.T).LUsolve(error)
-    fixed = []
-    for k, z in enumerate(rounded):
-        fixed.append(
-            z - sum((change[6 * k + u] * unit for u, unit in enumerate(units)), start=sp.zeros(3, 3))
-        )
-    return fixed
+    moves = [[change[6 * k + u] * unit for u, unit in enumerate(units)] for k in range(len(rounded))]
+    return [z - sum(own, start=sp.zeros(3, 3)) for z, own in zip(rounded, moves, strict=True)]
 
 
 def is_certificate(Z, slopes):
@@ -97,13 +81,8 @@ def test_where_there_is_a_metric_there_is_no_certificate():
 
 @pytest.mark.slow
 def test_synthesis_says_the_same():
-    from test_cegis import QUADROTOR, quadrotor_box
+    from test_cegis import QUADROTOR, problem, quadrotor_box
 
     for angle, feasible in (("1.0471975", False), ("0.761", True)):
-        asked = SynthesisProblem(
-            model=QUADROTOR,
-            safe_set=quadrotor_box(angle),
-            family=metric_family(QUADROTOR, degree=0),
-            rate=0.1,
-        )
+        asked = problem(QUADROTOR, quadrotor_box(angle), 0.1)
         assert bool(cegis.propose(asked).feasible) is feasible

@@ -346,18 +346,6 @@ def benchmark():
 # -- proposals --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("system", "box", "degree"),
-    [(TWO_STATE, BOX_FIVE, 0), (THREE_STATE, BOX_THREE, 1)],
-    ids=["two_state", "three_state"],
-)
-def test_the_second_solver_proposes_the_same(system, box, degree):
-    asked = problem(system, box, degree=degree, rate=0.7)
-    first, second = propose_sos(asked), propose_sos(replace(asked, solver="scs"))
-    assert first.kappa == pytest.approx(second.kappa, rel=1e-4)
-    assert "SCS" in second.status
-
-
 def test_with_as_many_inputs_as_states_the_identity_is_best():
     system = model(TWO, F_TWO, [["1", "0"], ["0", "1"]])
     proposal = propose_sos(problem(system, BOX_FIVE, degree=0, rate=5.0))

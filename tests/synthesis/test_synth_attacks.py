@@ -6,7 +6,6 @@ import json
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +28,6 @@ from tubecert.spec import Synthesis, load_text
 from tubecert.spec.metric_file import with_metric
 from tubecert.synthesis.diagnose import uncontrollable_mode
 
-ROOT = Path(__file__).parents[2]
 QUICK = settings(max_examples=30, deadline=None)
 
 

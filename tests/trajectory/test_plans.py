@@ -250,39 +250,6 @@ def test_the_defect_in_a_metric_that_depends_on_the_state(interpolation):
     assert found.above <= 1.01 * found.below
 
 
-def integrated(steps: int) -> Knots:
-    """Knots of an accurate integration of the swinging system with a held input."""
-    h = 1 / steps
-    state, states = np.array([1.0, 0.0]), [np.array([1.0, 0.0])]
-    for k in range(steps):
-        u = np.array([np.sin(3.0 * (k * 10 // steps))])
-        for _ in range(20):
-            d = h / 20
-            k1 = swing(state, u)
-            k2 = swing(state + d / 2 * k1, u)
-            k3 = swing(state + d / 2 * k2, u)
-            k4 = swing(state + d * k3, u)
-            state = state + d / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        states.append(state)
-    return Knots(
-        t=tuple(Fraction(k, steps) for k in range(steps + 1)),
-        x=tuple(tuple(Fraction(f"{v:.14f}") for v in row) for row in states),
-        u=tuple((Fraction(f"{np.sin(3.0 * (k * 10 // steps)):.17g}"),) for k in range(steps + 1)),
-        interpolation="hold",
-    )
-
-
-def test_the_defect_of_integrated_knots_is_of_third_order_in_the_step():
-    effort = Effort(gap=1e-3)
-    found = [
-        Defect.of(piecewise_plan(SWINGING, integrated(n)), SWINGING, 1e-4, effort).in_state().above
-        for n in (10, 20, 40)
-    ]
-    orders = np.log2(np.array(found[:-1]) / found[1:])
-    assert (orders > 2.8).all()
-    assert (orders < 3.4).all()
-
-
 def test_a_curve_that_is_a_solution_has_no_defect_to_speak_of():
     model = replace(POLYNOMIAL, f=(y, constant(0)), B=((constant(0),), (constant(1),)))
     t = [Fraction(0), Fraction(1, 3), Fraction(2, 3)]
