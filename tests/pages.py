@@ -146,14 +146,3 @@ def measure(path, folder, *, width: int, dark: bool = False) -> dict:
     parser.feed(found[1])
     parser.close()
     return json.loads("".join(texts))
-
-
-def on_paper(path, folder):
-    """A copy of the page that looks on a screen as it does in print."""
-    source = path.read_text(encoding="utf-8")
-    for media, other in (("@media print", "@media all"), ("@media screen", "@media not all")):
-        assert media in source
-        source = source.replace(media, other)
-    copy = folder / f"paper-{path.name}"
-    copy.write_text(source, encoding="utf-8")
-    return copy

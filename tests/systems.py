@@ -49,9 +49,10 @@ def matrix_of(rows: Sequence[Sequence[str]], names: Sequence[str]) -> tuple[tupl
 
 def plain_model(states: Sequence[str], f: Sequence[str], B: Sequence[Sequence[str]]) -> ControlAffineModel:
     """x' = f + B u without a metric."""
+    m = len(B[0])
     return ControlAffineModel(
         states=tuple(states),
-        inputs=tuple(f"u{j}" for j in range(len(B[0]))),
+        inputs=("u",) if m == 1 else tuple(f"u{j}" for j in range(m)),
         f=matrix_of([f], states)[0],
         B=matrix_of(B, states),
         W=(),

@@ -1,7 +1,5 @@
 """`tc.sweep` and `tc.compare`: values that say what the files say."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The test for unique geodesics against Christoffel symbols by differences of M, and closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path

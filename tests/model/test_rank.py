@@ -1,7 +1,5 @@
 """The rank of B and what must hold for expressions to be defined: proven where it holds, never where it does not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """How far a command is: a line every ten seconds in a log, a bar on a terminal, the time that is left."""
 
-from __future__ import annotations
-
 import io
 import re
 from dataclasses import replace
@@ -108,12 +106,6 @@ def test_a_line_is_no_longer_than_the_terminal():
 def test_what_a_name_holds_steers_no_terminal():
     (line,) = lines([(11.0, Step(phase=Phase.CHECK, name="\x1b[2Jx\n::error::", done=1, of=2))])
     assert "\x1b" not in line
-
-
-def test_long_times_are_told_in_minutes_and_hours():
-    for seconds, words in ((120.0, "about 2.0 h left"), (60.0, "about 59 min left")):
-        found = lines([(0.0, points(0)), (seconds, points(1))])
-        assert words in found[-1]
 
 
 def test_nothing_is_told_where_nothing_is_wanted():

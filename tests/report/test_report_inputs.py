@@ -1,7 +1,5 @@
 """What reports, `check --certify` and the schema say of inputs with limits."""
 
-from __future__ import annotations
-
 from io import StringIO
 
 import pytest

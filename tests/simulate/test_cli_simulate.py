@@ -1,7 +1,5 @@
 """The command `simulate`: exit codes, files, bytes, and one clear message per mistake."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Clearances against dense sampling of the obstacles."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

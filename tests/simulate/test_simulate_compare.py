@@ -1,7 +1,5 @@
 """Promises and what breaks them: every bound is broken on purpose, and everything within is left alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 
@@ -77,7 +75,6 @@ def test_the_error_of_the_estimate_counts_from_the_start():
 def test_the_largest_promised_distance_is_the_margin_of_the_certificate():
     _, result = certified("two_state", "0.4")
     found = promise(read_numbers(result), KINDS["distance"])
-    assert found is not None
     assert found.decay is not None
     margin = result.to_json()["distance"]["least_adaptation"]["margin"]
     left = 1 - found.decay(np.linspace(0, 5, 5001)).max() / found.reach

@@ -1,7 +1,5 @@
 """Compilation of the loops: told while it lasts, kept where there is a folder; runs end when the user interrupts."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

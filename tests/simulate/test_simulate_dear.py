@@ -1,7 +1,5 @@
 """Loops whose runs take very many steps: attacked with fewer, less accurate runs; and geodesics of a lower degree."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

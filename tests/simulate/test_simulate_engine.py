@@ -1,7 +1,5 @@
 """The integrator against scipy's DOP853 on right-hand sides written here in numpy, and against its own orders."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path

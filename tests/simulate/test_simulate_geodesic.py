@@ -1,7 +1,5 @@
 """Chebyshev geodesics against closed forms, a boundary value problem, and their own order."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise

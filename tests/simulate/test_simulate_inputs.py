@@ -1,7 +1,5 @@
 """Inputs with limits in runs: every loop keeps to what is proven of it, and a bound that is too small is broken."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 
@@ -49,7 +47,6 @@ def test_random_runs_and_an_adversary_stay_within_what_is_proven(limited, letter
     assert len(comparisons) == 3
     for comparison in comparisons:
         (use,) = comparison.inputs
-        assert use.proven is not None
         assert use.proven[0] <= use.least <= use.greatest <= use.proven[1]
         assert (
             own.plan.least.above == own.plan.greatest.above == 0

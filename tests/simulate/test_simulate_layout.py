@@ -1,7 +1,5 @@
 """Where things are in the compiled lanes: blocks of y, terms of the loops, and what is known of the state."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

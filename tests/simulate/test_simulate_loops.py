@@ -3,8 +3,6 @@
 Everything is written here a second time in numpy, from the theory: plan, feedback, predictor, projection, adaptation.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Random plans of a family: they are members, the certified loop keeps to all of them, and a broken promise is seen."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Compiled programs against mpmath: every function of the language has its own step."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import mpmath

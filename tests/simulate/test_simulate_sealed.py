@@ -1,7 +1,5 @@
 """Machine code in the cache: stale, broken, exchanged or planted files are never run, and certify uses none."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import pickle

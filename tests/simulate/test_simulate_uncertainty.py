@@ -1,7 +1,5 @@
 """Members of a class are in it, and use it: checked by evaluating them, not by the formulas that made them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

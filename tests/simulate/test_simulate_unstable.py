@@ -1,7 +1,5 @@
 """Loops that leave the plan: stopped in time, and said in words (U10)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Wind and unknown parameters in simulated loops: what acts, and that no certified bound is exceeded."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """A sweep on a Dask cluster: a scheduler and workers on this machine, one of them killed; the bytes of a serial run."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

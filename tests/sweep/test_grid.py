@@ -1,7 +1,5 @@
 """Ranges of keys: what they stand for, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from itertools import pairwise
@@ -47,7 +45,6 @@ def test_a_range_goes_from_end_to_end_in_equal_steps_or_factors(first, last, cou
         return
     assert (axis.texts[0], axis.texts[-1], len(axis.texts)) == (str(first), str(last), count)
     values = axis.numbers
-    assert values is not None
     for i, value in enumerate(values):
         share = i / (count - 1)
         steps = float(first + (last - first) * Fraction(i, count - 1))

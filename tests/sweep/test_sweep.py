@@ -1,7 +1,5 @@
 """Sweeps: every point has its row and the certificate of `certify --set`; nothing is lost, and nothing of another."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """Solvers through cvxpy: the same programs, the same answers; no warning, no breakdown and no lie gets through."""
 
-from __future__ import annotations
-
 import json
 import re
 import warnings

@@ -1,7 +1,5 @@
 """When a search ends before its end: nothing better is asked for, no metric can serve, or it is out of reach."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """What cancels in a quotient of expressions, and that nothing else is changed."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

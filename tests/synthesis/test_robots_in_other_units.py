@@ -1,7 +1,5 @@
 """A system in other units has the same metric, gains and half-widths: the generator of `benchmarks/robots.py`."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import sys

@@ -1,7 +1,5 @@
 """Rounding that lies: a metric is called proven only if the proof is about what is written."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path

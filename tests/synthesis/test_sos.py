@@ -1,7 +1,5 @@
 """Synthesis by sums of squares: its parts against definitions, its proposals against the verifier and against cvxpy."""
 
-from __future__ import annotations
-
 import importlib.util
 from dataclasses import replace
 from fractions import Fraction
@@ -142,7 +140,6 @@ def test_both_solvers_and_cvxpy_agree(seed, n, blocks):
     y = cvxpy.Variable(N)
     parts = [np.eye(n) + sum(y[k] * s[k] for k in range(N)) >> 0 for s in slopes]
     oracle = optimum(cvxpy.Problem(cvxpy.Minimize(cost @ y), parts))
-    assert oracle is not None
     for answer in found:
         assert answer.objective == pytest.approx(oracle.value, rel=1e-4, abs=1e-4)
 
@@ -331,7 +328,6 @@ def test_eliminated_split_and_direct_is_what_cvxpy_finds_plainly(system, box, de
     everything = polynomial_conditions(asked, pieces=0, symmetric=False)
     assert conditions.unknowns.count <= everything.unknowns.count
     plain = optimum(benchmark().plain(everything))
-    assert plain is not None
     assert propose_sos(asked).kappa == pytest.approx(plain.value, rel=max(1e-5, 10 * plain.tolerance))
 
 

@@ -1,7 +1,5 @@
 """Attacks on synthesis: what is written was proven as written, what is refuted is impossible, no input is destroyed."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from fractions import Fraction
@@ -90,7 +88,6 @@ def test_repeated_modes_are_bounded_truly(order):
     system = model([*names, "w"], [*chain, "0"], [*([["0"]] * order), ["1"]])
     for rate in (Fraction("1.00000001"), Fraction("1.01"), Fraction(2)):
         mode = at_origin(system, rate)
-        assert mode is not None
         assert 1 <= mode.limit <= rate
         assert mode.failure().limit == mode.limit
         if rate > Fraction("1.005"):
@@ -118,7 +115,6 @@ def test_what_is_excluded_is_excluded_by_a_mode_that_no_input_reaches(entries, r
     slowest = np.linalg.eigvals(Z @ (moved / 3) @ np.linalg.pinv(Z)).real.max()
     mode = at_origin(system, rate)
     if rate > -slowest + 1e-6:
-        assert mode is not None
         assert mode.excludes(rate)
         assert -slowest - 1e-5 <= mode.bound <= -slowest + 1e-4 * (1 + abs(slowest))
     elif rate < -slowest - 1e-6:
@@ -129,7 +125,6 @@ def test_a_forced_equilibrium_with_a_moving_input_direction():
     """A = f_x + u b_x there: x' = x - x u is held at 0 by u = 2, where its mode is 1 - 2 = -1 and not 1."""
     moving = model("xy", ["x", "-2"], [["-x"], ["1"]])
     found = at_origin(moving, 3)
-    assert found is not None
     assert found.limit == 1
     assert at_origin(moving, Fraction(1, 2)) is None
     fixed = model("xy", ["x", "-2"], [["x**2"], ["1"]])

@@ -144,14 +144,12 @@ def test_a_mode_that_no_input_reaches_bounds_the_rate_exactly():
     assert uncontrollable_mode(system, origin, Fraction(999, 1000)) is None
     for rate in (Fraction(1), Fraction(101, 100)):
         mode = uncontrollable_mode(system, origin, rate)
-        assert mode is not None
         assert mode.bound == pytest.approx(1)
         assert mode.failure().mode == (-1.0, 0.0)
     assert uncontrollable_mode(CART_POLE, [(Fraction(0),) * 4], Fraction(50)) is None
     # forced: x' = x + u, y' = -2 y + x - 1 with the equilibrium x = 1 held by u = -1 (y = 0), and a mode at -2 cut off
     forced = model(("x", "y"), ("x", "-2*y"), [["1"], ["0"]])
     at_one = uncontrollable_mode(forced, [(Fraction(1), Fraction(0))], Fraction(3))
-    assert at_one is not None
     assert at_one.bound == pytest.approx(2)
     assert uncontrollable_mode(forced, [(Fraction(1), Fraction(1))], Fraction(3)) is None  # no equilibrium
 
@@ -171,10 +169,8 @@ def test_the_rate_is_searched_up_to_what_is_possible():
     double = model(("x", "y"), ("y", "0"), [["0"], ["1"]])
     box = ((Fraction(-1), Fraction(1)),) * 2
     found = ladder(cegis.propose, double, box).largest_rate(20.0)
-    assert found is not None
     assert found.condition_number.above <= 20
     higher = ladder(cegis.propose, double, box).metric(found.rate * Fraction(11, 10))
-    assert higher is not None
     assert higher.condition_number.above > 20
 
 

@@ -1,7 +1,5 @@
 """Families of plans: what is proven for all is at least what holds for any one, and recheck proves it again."""
 
-from __future__ import annotations
-
 import copy
 import json
 from fractions import Fraction

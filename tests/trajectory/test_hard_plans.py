@@ -1,7 +1,5 @@
 """Plans and numbers that are hard for the search: symmetry about the origin, points far away, radii that underflow."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from itertools import permutations

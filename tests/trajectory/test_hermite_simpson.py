@@ -1,7 +1,5 @@
 """Plans of collocation planners: rows are in turn a knot and a point between two, u* is quadratic through the three."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The planner and what becomes of its plans: the goal, the sub-knots, the cache, and the published cases."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from fractions import Fraction

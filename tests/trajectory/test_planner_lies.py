@@ -1,7 +1,5 @@
 """A planner and a cache that lie: no plan is taken for what it is not."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from fractions import Fraction

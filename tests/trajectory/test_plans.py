@@ -1,7 +1,5 @@
 """Plans through knots: what their enclosures contain, how their defect is bounded, and what a plan file may say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
