@@ -264,15 +264,3 @@ def test_the_one_beside_it_holds_where_it_fails(each):
 def test_what_was_found_is_verified_again():
     path = GALLERY / "found" / "rmp_quadrotor_accelerations.yaml"
     assert CliRunner().invoke(app, ["verify", str(path), "--expect"]).exit_code == 0
-
-
-@pytest.mark.slow
-def test_verify_compares_with_what_is_locked(tmp_path):
-    path = GALLERY / "lmi_pend.yaml"
-    run = CliRunner().invoke(app, ["verify", str(path), "--expect"])
-    assert run.exit_code == 0
-    other = tmp_path / "other.yaml"
-    other.write_text(path.read_text("utf-8").replace("metric: holds", "metric: refuted"))
-    run = CliRunner().invoke(app, ["verify", str(other), "--expect"])
-    assert run.exit_code == 1
-    assert "TC502" in run.output
