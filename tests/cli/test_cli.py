@@ -219,24 +219,10 @@ def test_options_are_exact(proven):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("option", ["--rho-a", "--epsilon", "--gap", "--budget"])
-@pytest.mark.parametrize(
-    "text",
-    [
-        "nan",
-        "inf",
-        "-1",
-        "0",
-        "abc",
-        "",
-        "1e10000000",
-        "0x10",
-        "1_000",
-        "--",
-        "1/0",
-        "9**9**9",
-        "__import__('os')",
-    ],
-)
+@pytest.mark.parametrize("text", [
+    "nan", "inf", "-1", "0", "abc", "", "1e10000000", "0x10", "1_000", "--", "1/0", "9**9**9",
+    "__import__('os')",
+])  # fmt: skip
 def test_bad_numbers(folder, option, text):
     result = run("certify", SPEC, option, text)
     quiet_failure(result, 2)
@@ -390,20 +376,14 @@ def test_bad_metric_files(folder, proven, change, fragment):
     assert fragment in result.stderr
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("{", "this is not JSON: "),
-        ("hello", "the metric file must be a mapping with the keys format, rate, dual_metric"),
-        (json.dumps({key: METRIC[key] for key in METRIC if key != "rate"}), "the metric file lacks rate"),
-        (json.dumps(METRIC | {"rate": -1}), "error TC112: rate is -1; it must be > 0"),
-        (
-            '{"format": "tubecert-certificate/3", "hash": "", "result": {}}',
-            "this is a certificate, not a metric",
-        ),
-        (TEXT, "this is a specification, not a metric file"),
-    ],
-)
+@pytest.mark.parametrize(("text", "said"), [
+    ("{", "this is not JSON: "),
+    ("hello", "the metric file must be a mapping with the keys format, rate, dual_metric"),
+    (json.dumps({key: METRIC[key] for key in METRIC if key != "rate"}), "the metric file lacks rate"),
+    (json.dumps(METRIC | {"rate": -1}), "error TC112: rate is -1; it must be > 0"),
+    ('{"format": "tubecert-certificate/3", "hash": "", "result": {}}', "this is a certificate, not a metric"),
+    (TEXT, "this is a specification, not a metric file"),
+])  # fmt: skip
 def test_errors_of_metric_files_name_the_file_and_its_keys(folder, unused, text, said):
     (folder / "w.json").write_text(text)
     result = run("certify", SPEC, "--metric", "w.json")
@@ -682,10 +662,7 @@ def test_check_an_empty_folder(folder):
 def test_check_mathematics(folder, monkeypatch):
     warning = Finding(code="TC299", message="odd", severity=Severity.WARNING)
     error = Finding(code="TC203", message="B loses rank in the safe set, at x1 = 0")
-    for found, code, words in (
-        ([warning], 0, "1 warning"),
-        ([warning, error], 1, "1 error, 1 warning"),
-    ):
+    for found, code, words in (([warning], 0, "1 warning"), ([warning, error], 1, "1 error, 1 warning")):
         monkeypatch.setattr(pipeline, "inspect", lambda _, found=found: found)
         result = run("check", SPEC, "--no-cache")
         assert result.exit_code == code

@@ -44,22 +44,16 @@ def test_a_command_line_that_means_something_else(
     assert hint in said(capsys, monkeypatch, *words)
 
 
-@pytest.mark.parametrize(
-    ("words", "hint"),
-    [
-        (("certify", "plant.yml"), "there is plant.yaml"),
-        (("certify", "folder/plan.yaml"), "no such file or directory"),
-        (("certify", "plant.yaml", "--metric", "plant.json"), "there is plant.metric.json"),
-        (
-            ("certify", "plant.yaml"),
-            "`tubecert synth plant.yaml` finds one; then add --metric plant.metric.json",
-        ),
-        (("verify", "plant.yaml"), "a metric file after the specification (tubecert synth finds one)"),
-        (("report", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
-        (("recheck", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
-        (("recheck", "other.json"), "give a file that tubecert certify wrote"),
-    ],
-)
+@pytest.mark.parametrize(("words", "hint"), [
+    (("certify", "plant.yml"), "there is plant.yaml"),
+    (("certify", "folder/plan.yaml"), "no such file or directory"),
+    (("certify", "plant.yaml", "--metric", "plant.json"), "there is plant.metric.json"),
+    (("certify", "plant.yaml"), "`tubecert synth plant.yaml` finds one; then add --metric plant.metric.json"),
+    (("verify", "plant.yaml"), "a metric file after the specification (tubecert synth finds one)"),
+    (("report", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
+    (("recheck", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
+    (("recheck", "other.json"), "give a file that tubecert certify wrote"),
+])  # fmt: skip
 def test_a_file_that_is_another_one(
     words: tuple[str, ...],
     hint: str,

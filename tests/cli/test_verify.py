@@ -173,9 +173,7 @@ WRITERS = {
     "json": lambda f: _json(f, {"coefficients": [ONE, SQUARE], "monomials": ["1", "x**2"], "rate": "1"}),
     "json powers": lambda f: _json(f, {"coefficients": [ONE, SQUARE], "powers": [[0, 0], [2, 0]], "rate": 1}),
     "csv": lambda f: _csv(f, [ONE, SQUARE], ["1", "x**2"]),
-    "npz": lambda f: _npz(
-        f, coefficients=np.array([ONE, SQUARE]), monomials=np.array(["1", "x**2"]), rate=1.0
-    ),
+    "npz": lambda f: _npz(f, coefficients=np.array([ONE, SQUARE]), monomials=np.array(["1", "x**2"]), rate=1.0),
     "npz powers": lambda f: _npz(f, coefficients=np.array([ONE, SQUARE]), powers=np.array([[0, 0], [2, 0]])),
     "mat": lambda f: _mat(
         f,
@@ -183,10 +181,8 @@ WRITERS = {
         monomials=np.array(["1", "x**2"], dtype=object),
         rate=1.0,
     ),
-    "mat powers": lambda f: _mat(
-        f, coefficients=np.moveaxis(np.array([ONE, SQUARE]), 0, -1), powers=[[0, 0], [2, 0]]
-    ),
-}
+    "mat powers": lambda f: _mat(f, coefficients=np.moveaxis(np.array([ONE, SQUARE]), 0, -1), powers=[[0, 0], [2, 0]]),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", WRITERS)

@@ -145,11 +145,7 @@ DOMAINS = {
     "sqrt": (iv.sqrt, lambda x: x.sqrt(), numbers.map(abs)),
     "exp": (iv.exp, lambda x: x.exp(), numbers.filter(lambda x: abs(x) < 5000)),
     "expm1": (iv.expm1, lambda x: x.expm1(), numbers.filter(lambda x: abs(x) < 5000)),
-    "log1p": (
-        iv.log1p,
-        lambda x: x.log1p(),
-        numbers.filter(lambda x: x > -1) | st.floats(-1, 0, exclude_min=True),
-    ),
+    "log1p": (iv.log1p, lambda x: x.log1p(), numbers.filter(lambda x: x > -1) | st.floats(-1, 0, exclude_min=True)),
     "sin": (iv.sin, lambda x: x.sin(), numbers.filter(lambda x: abs(x) < 1e30)),
     "cos": (iv.cos, lambda x: x.cos(), numbers.filter(lambda x: abs(x) < 1e30)),
     "tan": (iv.tan, lambda x: x.tan(), numbers.filter(lambda x: abs(x) < 1e30)),
@@ -160,7 +156,7 @@ DOMAINS = {
     "cosh": (iv.cosh, lambda x: x.cosh(), numbers.filter(lambda x: abs(x) < 5000)),
     "tanh": (iv.tanh, lambda x: x.tanh(), numbers.filter(lambda x: abs(x) < 5000)),
     "log": (iv.log, lambda x: x.log(), numbers.map(abs).filter(bool)),
-}
+}  # fmt: skip
 LIBRARY = {"atan": "arctan", "asin": "arcsin", "acos": "arccos"}
 
 
@@ -206,9 +202,7 @@ def test_tangent_across_a_pole_is_undefined(k, side, width):
 
 
 @pytest.mark.slow
-@given(
-    drawn=st.lists(intervals(numbers.filter(lambda x: abs(x) < 1e150)), min_size=1, max_size=4),
-)
+@given(drawn=st.lists(intervals(numbers.filter(lambda x: abs(x) < 1e150)), min_size=1, max_size=4))
 @SETTINGS
 def test_norm_and_direction_contain_the_exact_result(drawn):
     exact = [q for _, q in drawn]

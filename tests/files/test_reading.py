@@ -68,21 +68,17 @@ STRANGE = ["pipe", "link to a pipe", "folder", "socket", "/dev/null", "/dev/tty"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", STRANGE)
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["certify"],
-        ["check"],
-        ["synth"],
-        ["simulate"],
-        ["recheck"],
-        ["report"],
-        ["certify", ROOT / "configs" / "three_state.yaml", "--metric"],
-        ["simulate", ROOT / "configs" / "three_state.yaml", "--certificate"],
-        ["recheck", "no.json", "--spec"],
-    ],
-    ids=lambda words: " ".join(Path(word).name for word in words),
-)
+@pytest.mark.parametrize("command", [
+    ["certify"],
+    ["check"],
+    ["synth"],
+    ["simulate"],
+    ["recheck"],
+    ["report"],
+    ["certify", ROOT / "configs" / "three_state.yaml", "--metric"],
+    ["simulate", ROOT / "configs" / "three_state.yaml", "--certificate"],
+    ["recheck", "no.json", "--spec"],
+], ids=lambda words: " ".join(Path(word).name for word in words))  # fmt: skip
 def test_only_regular_files_are_read(command, kind):
     name = strange(kind)
     started = time.monotonic()

@@ -28,13 +28,9 @@ EDGE = {  # where data comes in or goes out, and what it is
     "report/sarif.py": "the JSON of a foreign format",
 }
 KINDS = (
-    "mappings of Any",
-    "string-key reads",
-    "Any",
-    "asserts that something is not None",
-    "verdict literals",
+    "mappings of Any", "string-key reads", "Any", "asserts that something is not None", "verdict literals",
     "comparisons with sentences",
-)
+)  # fmt: skip
 
 
 def found(tree: ast.Module) -> Iterator[tuple[str, int]]:

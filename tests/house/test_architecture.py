@@ -15,64 +15,17 @@ from tubecert.recheck.specified.loop import LETTERS
 PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
 ROOMS = [
-    "release",
-    "errors",
-    "printable",
-    "findings",
-    "files",
-    "kept",
-    "leash",
-    "executor",
-    "libraries",
-    "verdict",
-    "letters",
-    "progress",
-    "expression",
-    "records",
-    "digits",
-    "recheck",
-    "spec",
-    "enclosure",
-    "claims",
-    "model",
-    "coordinates",
-    "metric",
-    "synthesis",
-    "trajectory",
-    "planner",
-    "tube",
-    "bounds",
-    "conditions",
-    "kernel",
-    "search",
-    "lint",
-    "kinds",
-    "certificate",
-    "stages",
-    "words",
-    "simulate",
-    "pipeline",
-    "checking",
-    "sweep",
-    "report",
-    "library",
-    "cli",
-]
+    "release", "errors", "printable", "findings", "files", "kept", "leash", "executor", "libraries",
+    "verdict", "letters", "progress", "expression", "records", "digits", "recheck", "spec", "enclosure",
+    "claims", "model", "coordinates", "metric", "synthesis", "trajectory", "planner", "tube", "bounds",
+    "conditions", "kernel", "search", "lint", "kinds", "certificate", "stages", "words", "simulate",
+    "pipeline", "checking", "sweep", "report", "library", "cli",
+]  # fmt: skip
 MODULES = sorted(PACKAGE.rglob("*.py"))
 HEAVY = {
-    "numpy",
-    "scipy",
-    "cvxpy",
-    "clarabel",
-    "yaml",
-    "rich",
-    "pydantic",
-    "matplotlib",
-    "jinja2",
-    "flint",
-    "numba",
-    "distributed",
-}
+    "numpy", "scipy", "cvxpy", "clarabel", "yaml", "rich", "pydantic", "matplotlib", "jinja2", "flint",
+    "numba", "distributed",
+}  # fmt: skip
 ALLOWED_AT_START = {"typer"}
 FORBIDDEN_CALLS = {"eval", "exec", "compile", "sympify", "safe_load", "unsafe_load", "full_load", "load_all"}
 
@@ -170,16 +123,12 @@ def loaded_by(statement: str) -> set[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "statement",
-    [
-        "import tubecert.cli",
-        "from typer.testing import CliRunner; from tubecert.cli.app import app; CliRunner().invoke(app, ['--help'])",
-        "import tubecert as tc; dir(tc); tc.TubecertError, tc.Verdict",
-        "import tubecert.expression",
-        "import tubecert.errors, tubecert.findings",
-    ],
-)
+@pytest.mark.parametrize("statement", [
+    "import tubecert.cli",
+    "from typer.testing import CliRunner; from tubecert.cli.app import app; CliRunner().invoke(app, ['--help'])",
+    "import tubecert as tc; dir(tc); tc.TubecertError, tc.Verdict", "import tubecert.expression",
+    "import tubecert.errors, tubecert.findings",
+])  # fmt: skip
 def test_heavy_libraries_come_late(statement):
     assert not loaded_by(statement) & HEAVY
 

@@ -41,12 +41,7 @@ def test_the_edge_is_where_it_is_said_to_be(name):
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "def f(x: Mapping[str, Any]) -> None: ...",
-        "x: dict[str, Json] = {}",
-        "T = Mapping[str, Tree]",
-    ],
+    "text", ["def f(x: Mapping[str, Any]) -> None: ...", "x: dict[str, Json] = {}", "T = Mapping[str, Tree]"]
 )
 def test_a_mapping_of_any_is_found_under_each_of_its_names(text):
     assert "mappings of Any" in {kind for kind, _ in found(ast.parse(text))}

@@ -147,14 +147,9 @@ TABLES = {
     "us": ("TC413", "1:1", "us", table(times=1e6)),
     "exchanged": ("TC414", "1:1", "columns p and v", table(names="t,v,p,u")),
     "a row": ("TC407", "22:1", "t = 1 s does not belong", table(wrong=(20,))),
-    "rows, and a blank line": (
-        "TC407",
-        "32:1",
-        "t = 1.45 s",
-        table(wrong=(29,)).replace("\n0.05,", "\n\n0.05,"),
-    ),
+    "rows, and a blank line": ("TC407", "32:1", "t = 1.45 s", table(wrong=(29,)).replace("\n0.05,", "\n\n0.05,")),
     "another plan": ("TC407", "25:1", "between t = 1.15 s", table(names="t,p,u,v")),
-}
+}  # fmt: skip
 
 
 def inspected(folder, text, interpolation="linear"):

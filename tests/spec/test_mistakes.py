@@ -28,7 +28,9 @@ def found(text: str) -> list[Finding]:
 
 
 def test_without_a_mistake_nothing_is_said() -> None:
-    assert [item.code for item in found(GOOD)] == ["TC416"]  # the machine, which is not part of what is proven
+    assert [item.code for item in found(GOOD)] == [
+        "TC416"
+    ]  # the machine, which is not part of what is proven
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake[1].strip()[:40] or "left out")

@@ -27,25 +27,18 @@ def read(text: str, *words: str) -> Spec:
     return load_source(Source.of("file.yaml", text), [Setting.of(each) for each in words])
 
 
-@pytest.mark.parametrize(
-    ("words", "old", "new"),
-    [
-        (["tube.epsilon=.25"], "epsilon: 0.6", "epsilon: .25"),
-        (["tube.epsilon = 1/4 "], "epsilon: 0.6", "epsilon: 1/4"),
-        (["initial_state.at[1]=-2"], "[3.4, -2.4]", "[3.4, -2]"),
-        (["safe_set.x2=[-7, 8]"], "x2: [-6, 6]", "x2: [-7, 8]"),
-        (["system.f[0]=-x1 + 3*x2"], "- -x1 + 2*x2", "- -x1 + 3*x2"),
-        (["tube={epsilon: .25, rho_a: 0.1}"], "epsilon: 0.6", "epsilon: .25"),
-        (
-            ["metric.bounds.lower=.1", "metric.bounds.upper=9"],
-            "rate: 1.74",
-            "bounds: {lower: .1, upper: 9}\n  rate: 1.74",
-        ),
-        (["conditions.decides=B"], "tube:", "conditions: {decides: B}\ntube:"),
-        (["trajectory.Q=[[1, 0], [0, 2]]"], "Q: 0.5", "Q: [[1, 0], [0, 2]]"),
-        (["name=other", "trajectory.knots=11"], "name: two_state", "name: other"),
-    ],
-)
+@pytest.mark.parametrize(("words", "old", "new"), [
+    (["tube.epsilon=.25"], "epsilon: 0.6", "epsilon: .25"),
+    (["tube.epsilon = 1/4 "], "epsilon: 0.6", "epsilon: 1/4"),
+    (["initial_state.at[1]=-2"], "[3.4, -2.4]", "[3.4, -2]"),
+    (["safe_set.x2=[-7, 8]"], "x2: [-6, 6]", "x2: [-7, 8]"),
+    (["system.f[0]=-x1 + 3*x2"], "- -x1 + 2*x2", "- -x1 + 3*x2"),
+    (["tube={epsilon: .25, rho_a: 0.1}"], "epsilon: 0.6", "epsilon: .25"),
+    (["metric.bounds.lower=.1", "metric.bounds.upper=9"], "rate: 1.74", "bounds: {lower: .1, upper: 9}\n  rate: 1.74"),
+    (["conditions.decides=B"], "tube:", "conditions: {decides: B}\ntube:"),
+    (["trajectory.Q=[[1, 0], [0, 2]]"], "Q: 0.5", "Q: [[1, 0], [0, 2]]"),
+    (["name=other", "trajectory.knots=11"], "name: two_state", "name: other"),
+])  # fmt: skip
 def test_a_key_that_is_set_is_as_if_the_file_said_so(words: list[str], old: str, new: str) -> None:
     assert TWO.count(old) == 1
     edited = TWO.replace(old, new)

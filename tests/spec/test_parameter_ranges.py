@@ -71,12 +71,7 @@ def test_ends_that_are_no_decimals_are_rounded_outward():
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("0.05*x", "m*x"),
-        ("input: [0]", "input: [m]"),
-        ("at: [0.05", "at: [m"),
-    ],
+    ("old", "new"), [("0.05*x", "m*x"), ("input: [0]", "input: [m]"), ("at: [0.05", "at: [m")]
 )
 def test_anywhere_else_it_is_refused(old, new):
     with pytest.raises(SpecError, match=r"known by a range only|unknown symbol m"):

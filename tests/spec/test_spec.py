@@ -248,14 +248,7 @@ def test_equal_systems_have_equal_canonical_forms() -> None:
     assert canonical(load_text(changed)) != canonical(load_text(MINIMAL))
 
 
-HIDDEN = [
-    "0*sqrt(x - 5)",
-    "0/x",
-    "x*x**-1 - 1",
-    "0*tan(x)",
-    "(1/x)**0 - 1",
-    "sin(0/(x + 3))",
-]
+HIDDEN = ["0*sqrt(x - 5)", "0/x", "x*x**-1 - 1", "0*tan(x)", "(1/x)**0 - 1", "sin(0/(x + 3))"]
 
 
 @pytest.mark.parametrize("dropped", HIDDEN)
@@ -337,18 +330,14 @@ def test_control_characters_of_a_file_are_not_printed() -> None:
         assert all(character.isprintable() or character == "\n" for character in str(found[0]))
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda tmp: tmp / "missing.yaml",
-        lambda tmp: tmp,
-        lambda tmp: tmp / "missing" / "file.yaml",
-        lambda tmp: "",
-        lambda tmp: "nul\x00name.yaml",
-        lambda tmp: tmp / ("long" * 200),
-    ],
-    ids=["missing", "directory", "parent", "empty", "nul", "long"],
-)
+@pytest.mark.parametrize("make", [
+    lambda tmp: tmp / "missing.yaml",
+    lambda tmp: tmp,
+    lambda tmp: tmp / "missing" / "file.yaml",
+    lambda tmp: "",
+    lambda tmp: "nul\x00name.yaml",
+    lambda tmp: tmp / ("long" * 200),
+], ids=["missing", "directory", "parent", "empty", "nul", "long"])  # fmt: skip
 def test_targets_that_cannot_be_read(make, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(TargetError) as caught:
         load(str(make(tmp_path)))
@@ -479,63 +468,10 @@ adaptation: {{A_m: -3}}
 
 SEEDS = [path.read_text(encoding="utf-8-sig") for path in OK + CONFIGS]
 SNIPPETS = [
-    *(
-        "[",
-        "]",
-        "{",
-        "}",
-        ":",
-        ": ",
-        "- ",
-        "\n",
-        "  ",
-        "\t",
-        "#",
-        "&a ",
-        "*a",
-        "!!str ",
-        "|",
-        ">",
-        "'",
-        '"',
-        "%",
-        "@",
-    ),
-    *(
-        "x",
-        "t",
-        "u",
-        "0",
-        "-1",
-        "1e999",
-        ".nan",
-        "null",
-        "**",
-        "^",
-        "/0",
-        "sqrt(",
-        "(",
-        ")",
-        ",",
-        "\u03bb",
-        "\x00",
-    ),
-    *(
-        "<<: ",
-        "? ",
-        "---\n",
-        "...",
-        "auto",
-        "name",
-        "f: ",
-        "kind: csv",
-        "~",
-        "\ufeff",
-        "\u2028",
-        "\r",
-        "\U0001f600",
-    ),
-]
+    *("[", "]", "{", "}", ":", ": ", "- ", "\n", "  ", "\t", "#", "&a ", "*a", "!!str ", "|", ">", "'", '"', "%", "@"),
+    *("x", "t", "u", "0", "-1", "1e999", ".nan", "null", "**", "^", "/0", "sqrt(", "(", ")", ",", "\u03bb", "\x00"),
+    *("<<: ", "? ", "---\n", "...", "auto", "name", "f: ", "kind: csv", "~", "\ufeff", "\u2028", "\r", "\U0001f600"),
+]  # fmt: skip
 
 
 @st.composite
