@@ -2,7 +2,7 @@
 
 Every case follows from its number. A case fails if anything but findings comes out: an exception, exit code 3, a
 finding without a place or page, a canonical form that does not load again, a key that the JSON Schema does not know,
-an alarm, or a worker that dies (memory is limited).
+or an alarm; a case that kills the process (memory is limited) was the last one named on stderr.
 
     python tests/harness/fuzz.py --cases 100000                  # parse and lint
     python tests/harness/fuzz.py --cases 1000 --mode certify     # the command, with a small budget; metrics for
@@ -13,21 +13,17 @@ an alarm, or a worker that dies (memory is limited).
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
-import multiprocessing
 import os
 import random
+import re
 import resource
 import signal
 import sys
 import tempfile
-import time
 import traceback
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -100,8 +96,6 @@ def _indent(rng: random.Random, lines: list[str]) -> None:
 
 
 def _tokens(text: str) -> list[tuple[int, int]]:
-    import re
-
     return [match.span() for match in re.finditer(r"[A-Za-z_]\w*|[\d.]+(?:e[+-]?\d+)?|\S", text)]
 
 
@@ -122,8 +116,6 @@ def _exchange_tokens(rng: random.Random, text: str) -> str:
 
 
 def _scale_number(rng: random.Random, text: str) -> str:
-    import re
-
     spans = [match.span() for match in re.finditer(r"\d+\.?\d*", text)]
     if not spans:
         return text
@@ -251,12 +243,9 @@ def _trajectory(rng: random.Random, e: Callable[..., str], n: int, m: int) -> di
             x, u = [e(["t"], 2) for _ in range(n)], [e(["t"], 2) for _ in range(m)]
             return {"kind": "expressions", "x": x, "u": u, "horizon": positive(rng)}
         case 1:
-            target = {
-                "kind": "ilqr",
-                "target": [number(rng) for _ in range(n)],
-                "knots": rng.choice([2, 5, 21]),
-            }
-            return {**target, "horizon": positive(rng), "goal": rng.choice(["true", "false"])}
+            target, knots = [number(rng) for _ in range(n)], rng.choice([2, 5, 21])
+            goal = rng.choice(["true", "false"])
+            return {"kind": "ilqr", "target": target, "knots": knots, "horizon": positive(rng), "goal": goal}
         case _:
             return {
                 "kind": "equilibrium",
@@ -362,7 +351,7 @@ class Judge:
         return f"exit {result.exit_code}"
 
 
-# the pool
+# the run
 
 
 class Alarm(BaseException):
@@ -373,178 +362,60 @@ def _ring(*_: object) -> None:
     raise Alarm
 
 
-def work(first: int, last: int, options: argparse.Namespace, pipe: Connection) -> None:
-    """The cases of one worker; each is announced, so that one that kills the worker is known."""
+def outcome(judge: Judge, number_: int, seconds: float) -> str:
+    """What became of a case; other work on the machine makes none slow, as seconds of this process are counted."""
+    try:
+        # again and again: a library may take the first ring for an error of its own
+        signal.setitimer(signal.ITIMER_PROF, seconds, 0.2 * seconds)
+        try:
+            return judge(number_)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0)
+    except Alarm:
+        return f"FAILED alarm after {seconds:g} s"
+    except Exception as error:  # whatever it is, it is a failure
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        return (
+            f"FAILED {type(error).__name__} in {Path(where.filename).name}:{where.lineno}: {str(error)[:300]}"
+        )
+
+
+def run(options: argparse.Namespace) -> dict[str, list[int]]:
+    """The cases of each outcome; memory is limited, and the number of a case that kills the process was said."""
     resource.setrlimit(resource.RLIMIT_AS, (options.memory << 20, options.memory << 20))
-    os.environ["OMP_NUM_THREADS"] = "1"
     os.environ["XDG_STATE_HOME"] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="fuzz-state-")
     signal.signal(signal.SIGPROF, _ring)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the pool deals with it
     judge = Judge(mode=options.mode, budget=options.budget)
     os.chdir(judge.folder)
-    for number_ in range(first, last):
-        pipe.send((number_, "started", 0.0))
-        began = time.process_time()  # other work on the machine makes no case slow
-        try:
-            # again and again: a library may take the first ring for an error of its own
-            signal.setitimer(signal.ITIMER_PROF, options.alarm, 0.2 * options.alarm)
-            try:
-                said = judge(number_)
-            finally:
-                signal.setitimer(signal.ITIMER_PROF, 0)
-        except Alarm:
-            said = f"FAILED alarm after {options.alarm:g} s"
-        except BaseException as error:  # whatever it is, it is a failure
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            said = f"FAILED {type(error).__name__} in {Path(where.filename).name}:{where.lineno}: {str(error)[:300]}"
-        pipe.send((number_, said, time.process_time() - began))
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10
-    pipe.send((last, "peak", float(peak)))
+    found: dict[str, list[int]] = {}
+    for number_ in range(options.first, options.first + options.cases):
+        print(f"\r{number_}", end="", file=sys.stderr, flush=True)
+        found.setdefault(outcome(judge, number_, options.alarm), []).append(number_)
+    print(file=sys.stderr)
+    return found
 
 
-@dataclass(slots=True)
-class Report:
-    """What came out."""
-
-    outcomes: Counter[str] = field(default_factory=Counter)
-    failures: list[tuple[int, str]] = field(default_factory=list)
-    slowest: tuple[float, int] = (0.0, -1)
-    peak: float = 0.0
-    interrupted: bool = False
-
-    def add(self, number_: int, said: str, seconds: float) -> None:
-        """Counts a case."""
-        if said.startswith("FAILED"):
-            self.failures.append((number_, said))
-            said = "FAILED"
-        self.outcomes[said] += 1
-        self.slowest = max(self.slowest, (seconds, number_))
-
-    def text(self) -> str:
-        """The summary."""
-        total = sum(self.outcomes.values())
-        lines = [
-            f"{total} cases, {len(self.failures)} failures; slowest {self.slowest[0]:.2f} s (case {self.slowest[1]})"
-        ]
-        lines[0] += f"; largest worker {self.peak:.0f} MB" + ("; interrupted" if self.interrupted else "")
-        lines += [f"  {count:7d}  {said}" for said, count in self.outcomes.most_common()]
-        kinds: dict[str, list[int]] = {}
-        for number_, said in sorted(self.failures):
-            kinds.setdefault(said, []).append(number_)
-        for said, numbers in sorted(kinds.items(), key=lambda item: -len(item[1]))[:40]:
-            lines.append(f"{said}: cases {numbers[:20]}{'...' if len(numbers) > 20 else ''} ({len(numbers)})")
-        return "\n".join(lines)
-
-
-def chunks(first: int, cases: int, size: int) -> Iterator[tuple[int, int]]:
-    """Ranges of cases."""
-    for start in range(first, first + cases, size):
-        yield start, min(start + size, first + cases)
-
-
-def run(options: argparse.Namespace) -> Report:
-    """All cases, `options.jobs` workers at a time; a worker that dies or hangs is replaced."""
-    waiting = list(chunks(options.first, options.cases, 1000 if options.cases > 2000 else 100))[::-1]
-    busy: dict[Connection, tuple[Any, int, int, float]] = {}
-    report = Report()
-    try:
-        while waiting or busy:
-            _start(busy, waiting, options)
-            for pipe in multiprocessing.connection.wait(list(busy), timeout=1.0):
-                _take(pipe, busy, waiting, report)
-            _watch(busy, waiting, report, options)
-    except KeyboardInterrupt:
-        for process, *_ in busy.values():
-            process.kill()
-        report.interrupted = True
-    return report
-
-
-def _start(busy: dict[Any, Any], waiting: list[tuple[int, int]], options: argparse.Namespace) -> None:
-    context = multiprocessing.get_context("spawn")
-    while waiting and len(busy) < options.jobs:
-        first, last = waiting.pop()
-        here, there = context.Pipe(duplex=False)
-        process = context.Process(target=work, args=(first, last, options, there))
-        process.start()
-        there.close()
-        busy[here] = (process, first, last, time.monotonic())
-        print(f"cases {first} to {last - 1}", file=sys.stderr, flush=True)
-
-
-def _watch(
-    busy: dict[Any, Any], waiting: list[tuple[int, int]], report: Report, options: argparse.Namespace
-) -> None:
-    """Kills workers in which not even the alarm was heard."""
-    for pipe, (process, current, _, since) in list(busy.items()):
-        if time.monotonic() - since > 3 * options.alarm + 60:
-            process.kill()
-            report.add(current, "FAILED hang: the alarm was not heard", time.monotonic() - since)
-            _restart(pipe, busy, waiting, current + 1)
-
-
-def _take(pipe: Any, busy: dict[Any, Any], waiting: list[tuple[int, int]], report: Report) -> None:
-    process, current, last, _ = busy[pipe]
-    try:
-        number_, said, seconds = pipe.recv()
-    except EOFError:
-        process.join()
-        if current < last:
-            report.add(current, f"FAILED worker died with {process.exitcode}", 0.0)
-        _restart(pipe, busy, waiting, current + 1)
-        return
-    if said == "peak":
-        report.peak = max(report.peak, seconds)
-        busy[pipe] = (process, last, last, time.monotonic())
-        return
-    if said != "started":
-        report.add(number_, said, seconds)
-        number_ += 1
-    busy[pipe] = (process, number_, last, time.monotonic())
-
-
-def _restart(pipe: Any, busy: dict[Any, Any], waiting: list[tuple[int, int]], first: int) -> None:
-    _, _, last, _ = busy.pop(pipe)
-    with contextlib.suppress(OSError):
-        pipe.close()
-    if first < last:
-        waiting.append((first, last))
-
-
-def options_of(arguments: list[str]) -> argparse.Namespace:
-    """The command line."""
+def main() -> int:
+    """Fuzz; 1 if anything failed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--cases", type=int, default=1000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--mode", choices=["lint", "certify"], default="lint")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument(
-        "--alarm", type=float, default=None, help="seconds of CPU per case [10; certify: 120]"
-    )
-    parser.add_argument("--memory", type=int, default=3000, help="address space of a worker, in MB")
-    parser.add_argument("--budget", type=int, default=None, help="boxes per claim [2000]")
+    parser.add_argument("--alarm", type=float, help="seconds of CPU per case [10; certify: 120]")
+    parser.add_argument("--memory", type=int, default=3000, help="address space, in MB")
+    parser.add_argument("--budget", type=int, default=2000, help="boxes per claim")
     parser.add_argument("--show", action="store_true", help="print the texts of the cases instead")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args()
     options.alarm = options.alarm or (10.0 if options.mode == "lint" else 120.0)
-    options.budget = options.budget or 2_000
-    return options
-
-
-def main() -> int:
-    """Fuzz; 1 if anything failed."""
-    options = options_of(sys.argv[1:])
     if options.show:
-        for number_ in range(options.first, options.first + options.cases):
-            print(case(number_))
+        print(*map(case, range(options.first, options.first + options.cases)), sep="\n")
         return 0
-    started = time.perf_counter()
-    report = run(options)
-    took = time.perf_counter() - started
-    print(f"{options.mode}, cases {options.first} to {options.first + options.cases - 1}, {took:.0f} s")
-    print(report.text())
-    return 1 if report.failures else 0
+    found = run(options)
+    for said, numbers in sorted(found.items(), key=lambda item: -len(item[1])):
+        print(f"{len(numbers):7d}  {said}{f': cases {numbers[:20]}' if said.startswith('FAILED') else ''}")
+    return int(any(said.startswith("FAILED") for said in found))
 
 
 if __name__ == "__main__":
