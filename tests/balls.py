@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import nullcontext
 from fractions import Fraction
+from typing import Any
 
-from flint import arb
+import numpy as np
+import pytest
+from flint import arb, ctx
 
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
@@ -13,6 +18,17 @@ _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 def ball(q: Fraction) -> arb:
     """A rational number."""
     return arb(q.numerator) / q.denominator
+
+
+def precision(bits: int, *, quiet: bool = False) -> Any:
+    """A fixture for all tests of a file: balls of so many bits; `quiet`: the silence that searches grant, too."""
+
+    @pytest.fixture(autouse=True)
+    def precision() -> Iterator[None]:
+        with ctx.workprec(bits), np.errstate(all="ignore") if quiet else nullcontext():
+            yield
+
+    return precision
 
 
 def _norm(*parts: arb) -> arb:

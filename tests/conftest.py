@@ -90,6 +90,19 @@ def commands_made_once():
 
 
 @pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty current folder; what is kept and logged is beside it, and no workflow is around."""
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    for name in ("GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY", "GITHUB_WORKSPACE"):
+        monkeypatch.delenv(name, raising=False)
+    return work
+
+
+@pytest.fixture
 def barely():
     """For tests of what is proven: no curves and no explanations, which take longer than the rest."""
     import proven

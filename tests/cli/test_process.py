@@ -16,19 +16,10 @@ ROOT = Path(__file__).parents[2]
 SPEC = str(ROOT / "configs" / "three_state.yaml")
 
 pytestmark = [
+    pytest.mark.usefixtures("folder"),
     pytest.mark.timeout(120),
     pytest.mark.skipif(os.name == "nt", reason="signals and limits of POSIX"),
 ]
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    work = tmp_path / "work"
-    work.mkdir()
-    monkeypatch.chdir(work)
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return work
 
 
 def started(*arguments, before: str = "", **options):

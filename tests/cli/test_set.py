@@ -8,12 +8,11 @@ from pathlib import Path
 
 import proven
 import pytest
+from commands import run
 from systems import SMALL
-from typer.testing import CliRunner
 
 from tubecert.certificate import dump, seal
 from tubecert.certificate.result import Result
-from tubecert.cli.app import app
 from tubecert.errors import ExitCode
 from tubecert.recheck.run import recheck
 from tubecert.simulate.certified import adopted
@@ -26,10 +25,6 @@ pytestmark = pytest.mark.timeout(120)
 ROOT = Path(__file__).parents[2]
 SPEC = ROOT / "configs" / "three_state.yaml"
 SETTINGS = ("--set", "tube.rho_a=1/100", "--set", "metric.rate=.99", "--set", "initial_state.at[0]=0.009")
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
 
 
 @pytest.fixture(scope="module")

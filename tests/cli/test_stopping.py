@@ -18,6 +18,7 @@ PENDULUM = str(ROOT / "tests" / "specs" / "robots" / "pendulum.yaml")
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.usefixtures("folder"),
     pytest.mark.timeout(300),
     pytest.mark.skipif(not hasattr(os, "fork"), reason="a command works in a fork"),
 ]
@@ -51,14 +52,6 @@ STEPS = {
         "import tubecert.sweep.run as place; place.certify_point = {how}",
     ),
 }
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path
 
 
 @pytest.fixture

@@ -3,13 +3,13 @@
 import io
 import json
 import zipfile
+from functools import partial
 
+import commands
 import numpy as np
 import pytest
 from scipy.io import savemat
-from typer.testing import CliRunner
 
-from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.model import build
@@ -36,9 +36,7 @@ safe_set: {x: [-0.5, 0.5], y: [-0.5, 0.5]}
 ONE, SQUARE = [[1, -0.5], [-0.5, 2]], [[0.25, 0], [0, 0.125]]
 
 
-def run(*arguments):
-    arguments = ["verify", "--no-progress", *map(str, arguments)]
-    return CliRunner().invoke(app, arguments, catch_exceptions=False)
+run = partial(commands.run, "verify", "--no-progress", catch_exceptions=False)
 
 
 @pytest.fixture

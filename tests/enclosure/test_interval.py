@@ -3,9 +3,11 @@
 import math
 from fractions import Fraction
 
+import balls
 import numpy as np
 import pytest
-from flint import arb, ctx
+from balls import ball
+from flint import arb
 from hypothesis import Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
@@ -25,13 +27,7 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 numbers = st.sampled_from(NASTY) | finite | st.floats(-10, 10) | st.floats(-1e-3, 1e-3)
 
 
-@pytest.fixture(autouse=True)
-def precision():
-    before, ctx.prec = ctx.prec, 240
-    with np.errstate(all="ignore"):
-        yield
-    ctx.prec = before
-
+precision = balls.precision(240, quiet=True)
 
 PARTS = [Fraction(0), Fraction(1), Fraction(1, 2), Fraction(1, 3), Fraction(997, 1000)]
 
@@ -53,10 +49,6 @@ def intervals(of=numbers):
 
 
 ANY = intervals()
-
-
-def ball(q):
-    return arb(q.numerator) / q.denominator
 
 
 def within(value, found):

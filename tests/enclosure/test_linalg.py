@@ -2,9 +2,10 @@
 
 from fractions import Fraction
 
+import balls as ball_arithmetic
 import numpy as np
 import pytest
-from flint import arb, arb_mat, ctx
+from flint import arb, arb_mat
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -27,13 +28,7 @@ QUICK = settings(max_examples=25, deadline=None)
 EIGH, SVD = np.linalg.eigh, np.linalg.svd
 
 
-@pytest.fixture(autouse=True)
-def precision():
-    """Ball arithmetic at 300 bits, and the silence that branch and bound grants too."""
-    before, ctx.prec = ctx.prec, 300
-    with np.errstate(all="ignore"):
-        yield
-    ctx.prec = before
+precision = ball_arithmetic.precision(300, quiet=True)
 
 
 def balls(m):

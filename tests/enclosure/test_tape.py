@@ -2,32 +2,23 @@
 
 from fractions import Fraction
 
+import balls
 import numpy as np
 import pytest
 from balls import evaluate, possible
-from flint import ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import NAMES, SYMBOLS, points, texts
+from strategies import NAMES, points, read, texts
 
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import Expression, constant, norm, parse, sin, sqrt, symbol
+from tubecert.expression import constant, norm, sin, sqrt, symbol
 
 SETTINGS = settings(max_examples=60, deadline=None)
 x, y = symbol("x"), symbol("y")
 
 
-@pytest.fixture(autouse=True)
-def precision():
-    before, ctx.prec = ctx.prec, 400
-    yield
-    ctx.prec = before
-
-
-def read(text: str) -> Expression:
-    return parse(text, symbols=SYMBOLS, kinks=True).expression
-
+precision = balls.precision(400)
 
 boxes = st.fixed_dictionaries(
     {name: st.tuples(st.floats(-2, 2), st.sampled_from([0.0, 1e-9, 0.1, 1.0])) for name in NAMES}

@@ -11,7 +11,7 @@ import pytest
 import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import NAMES, SYMBOLS, points, rationals, texts
+from strategies import NAMES, points, rationals, read, texts
 
 from tubecert.expression import (
     ONE,
@@ -26,7 +26,6 @@ from tubecert.expression import (
     free_symbols,
     norm,
     number_text,
-    parse,
     parse_number,
     power,
     sin,
@@ -38,10 +37,6 @@ from tubecert.expression import (
 )
 
 x, y = symbol("x"), symbol("y")
-
-
-def read(text: str) -> Expression:
-    return parse(text, symbols=SYMBOLS, kinks=True).expression
 
 
 def value(e: Expression, point: dict[str, Fraction]) -> mpmath.mpf:

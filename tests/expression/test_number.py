@@ -5,24 +5,17 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+import balls
 import mpmath
 import pytest
-from flint import arb, ctx
+from balls import ball
+from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tubecert.expression import PI, ExpressionError, Side, number_text, parse_constant, parse_number
 
-
-@pytest.fixture(autouse=True)
-def precision():
-    before, ctx.prec = ctx.prec, 800
-    yield
-    ctx.prec = before
-
-
-def ball(q: Fraction) -> arb:
-    return arb(q.numerator) / q.denominator
+precision = balls.precision(800)
 
 
 @pytest.mark.slow

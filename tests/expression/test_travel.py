@@ -9,15 +9,11 @@ import sys
 
 import pytest
 from hypothesis import given, settings
-from strategies import SYMBOLS, texts
+from strategies import read, texts
 
-from tubecert.expression import ONE, PI, ZERO, Expression, derivatives, norm, parse, sin, symbol, topological
+from tubecert.expression import ONE, PI, ZERO, Expression, derivatives, norm, sin, symbol, topological
 
 x, y = symbol("x"), symbol("y")
-
-
-def read(text: str) -> Expression:
-    return parse(text, symbols=SYMBOLS, kinks=True).expression
 
 
 def copies(e: Expression) -> list[Expression]:

@@ -5,14 +5,10 @@ from __future__ import annotations
 import mpmath
 import pytest
 from hypothesis import given, settings
-from strategies import SYMBOLS, points, texts
+from strategies import points, read, texts
 from test_graph import value
 
-from tubecert.expression import Expression, constant, derivative, is_zero, norm, parse, sin, sqrt
-
-
-def read(text: str) -> Expression:
-    return parse(text, symbols=SYMBOLS, kinks=True).expression
+from tubecert.expression import constant, derivative, is_zero, norm, sin, sqrt
 
 
 @pytest.mark.parametrize(

@@ -13,18 +13,17 @@ from pathlib import Path
 
 import certificates
 import pytest
+from commands import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.text import Text
 from systems import SMALL
-from typer.testing import CliRunner
 
 from tubecert.certificate import dump, seal
 from tubecert.certificate.result import Certificate
 from tubecert.checking import Checked
 from tubecert.checking.expectations import Claim
-from tubecert.cli.app import app
 from tubecert.cli.check import FORMATS
 from tubecert.errors import ExitCode
 from tubecert.findings import Finding, Location, Severity
@@ -45,23 +44,13 @@ STARTS = st.sampled_from(
 FOREIGN = st.builds(str.__add__, STARTS, NASTY)
 COMMAND = re.compile(r"\s*::|.*##\w*\[")
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 
 def is_clean(text: str) -> bool:
     """Whether nothing but line breaks is there that does not print, and no line is a command."""
     lines = text.split("\n")
     return all(line.isprintable() for line in lines) and not any(COMMAND.match(line) for line in lines)
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
 
 
 # the rules themselves

@@ -11,10 +11,9 @@ import time
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from commands import run
 
 from tubecert import files, kept, spec
-from tubecert.cli.app import app
 from tubecert.errors import TargetError, TubecertError
 from tubecert.findings import MOST, Finding, Location, Severity, capped
 
@@ -29,21 +28,7 @@ uncertainty: {h: ["0.1*sin(t)"]}
 trajectory: {kind: csv, file: "FILE"}
 """
 
-pytestmark = pytest.mark.timeout(60)
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
-
-
-def run(*arguments, stdin: bytes = b""):
-    return CliRunner().invoke(
-        app, [str(argument) for argument in arguments], input=stdin, prog_name="tubecert"
-    )
+pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.timeout(60)]
 
 
 def strange(kind: str) -> str:
@@ -129,7 +114,7 @@ def test_what_is_within_the_limit_is_read():
 
 
 def test_stdin_has_a_limit_as_well():
-    done = run("recheck", "-", stdin=b" " * 64_000_001)
+    done = run("recheck", "-", input=b" " * 64_000_001)
     assert (done.exit_code, "larger than" in done.output) == (2, True)
 
 

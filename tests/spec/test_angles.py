@@ -6,8 +6,8 @@ import json
 from fractions import Fraction
 from pathlib import Path
 
-import pytest
-from flint import arb, ctx
+import balls
+from flint import arb
 
 from tubecert.recheck.document import Node
 from tubecert.recheck.specification import read_specification
@@ -31,11 +31,7 @@ tube: {epsilon: 5 deg, rho_a: pi/100}
 """
 
 
-@pytest.fixture(autouse=True)
-def precision():
-    before, ctx.prec = ctx.prec, 400
-    yield
-    ctx.prec = before
+precision = balls.precision(400)
 
 
 def near(q: Fraction, exact: arb, side: int) -> bool:
