@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "harness"))
 
 import fuzz
 
-LINT = ["--cases", "100", "--budget", "200", "--alarm", "60"]
+LINT = ["--cases", "250", "--budget", "200", "--alarm", "60"]
 CERTIFY = ["--cases", "10", "--first", "50", "--mode", "certify", "--budget", "300"]
 
 

@@ -35,6 +35,15 @@ def balls(m):
     return arb_mat([[arb(float(x)) for x in row] for row in m])
 
 
+def eigenvalues(s):
+    return eigenvalues_midrad(*midrad(s))
+
+
+def covers(exact, mid, rad):
+    places = np.ndindex(mid.shape)
+    return all(abs(exact[i, j] - arb(float(mid[i, j]))) <= arb(float(rad[i, j])) for i, j in places)
+
+
 def exact_eigenvalues(m):
     """Ascending balls (the exact matrix must have separated eigenvalues, or be judged by `inertia`)."""
     power = -int(np.frexp(np.abs(m).max())[1])
@@ -115,15 +124,9 @@ def test_members_of_an_interval_matrix_have_enclosed_eigenvalues(seed, n, width)
 @QUICK
 def test_spectral_norms_are_enclosed(kind, seed, p, q):
     n = max(p, q)
-    m = (
-        symmetric(seed, kind, n)[:p, :q]
-        if n > 1
-        else np.array([[np.random.default_rng(seed).standard_normal()]])
-    )
+    m = symmetric(seed, kind, n)[:p, :q] if n > 1 else np.random.default_rng(seed).standard_normal((1, 1))
     if kind in ("tiny", "huge"):
-        m = m * (
-            1e60 if kind == "tiny" else 1e-60
-        )  # its square must not leave the range of the sum of squares
+        m = m * (1e60 if kind == "tiny" else 1e-60)  # squares must not leave the range of their sum
     found = spectral_norm(Interval.exact(m[None]))
     assert holds(exact_norm(m), found.lo[0], found.hi[0])
     assert found.hi[0] - found.lo[0] <= 1e-11 * np.abs(m).max() + 1e-140
@@ -146,11 +149,7 @@ def test_norm_bound_holds_for_every_member(seed, p, q):
 def test_congruence_and_quadratic_form_contain_the_exact_ones(seed, n, scale):
     rng = np.random.default_rng(seed)
     t, s, v = rng.standard_normal((n, n)), symmetric(seed, "plain", n) * scale, rng.standard_normal(n)
-    mid, rad = congruence(t, s, np.zeros_like(s))
-    exact = balls(t) * balls(s) * balls(t).transpose()
-    for i in range(n):
-        for j in range(n):
-            assert abs(exact[i, j] - arb(float(mid[i, j]))) <= arb(float(rad[i, j]))
+    assert covers(balls(t) * balls(s) * balls(t).transpose(), *congruence(t, s, np.zeros_like(s)))
     form = quadratic_form(v[None], s[None], np.zeros_like(s)[None])
     column = balls(v[:, None])
     assert holds((column.transpose() * balls(s) * column)[0, 0], form.lo[0], form.hi[0])
@@ -166,21 +165,14 @@ def test_product_contains_products_of_members(seed, p, q, r):
     for _ in range(4):
         one = a + ra * rng.choice([-0.999, 0.999], (p, q))
         two = b + rb * rng.choice([-0.999, 0.999], (q, r))
-        exact = balls(one) * balls(two)
-        for i in range(p):
-            for j in range(r):
-                assert abs(exact[i, j] - arb(float(mid[i, j]))) <= arb(float(rad[i, j]))
+        assert covers(balls(one) * balls(two), mid, rad)
 
 
 def test_congruence_by_a_huge_matrix_covers_underflow():
     # products t_ik s_kj that underflow are multiplied by the large entries of t afterwards
     t = np.array([[1e-160, 0.0], [0.0, 1e160]])
     s = np.array([[1.0, 1e-170], [1e-170, 1e-320]])
-    mid, rad = congruence(t, s, np.zeros_like(s))
-    exact = balls(t) * balls(s) * balls(t).transpose()
-    for i in range(2):
-        for j in range(2):
-            assert abs(exact[i, j] - arb(float(mid[i, j]))) <= arb(float(rad[i, j]))
+    assert covers(balls(t) * balls(s) * balls(t).transpose(), *congruence(t, s, np.zeros_like(s)))
 
 
 def test_quadratic_form_of_a_huge_vector_covers_underflow():
@@ -283,7 +275,7 @@ def lies(honest, rng):
             1.1,
             1 / 1.1,
             2.0,
-        ):  # vectors of another length, and values so that their product is the matrix
+        ):  # vectors of another length, and values such that their product is the matrix
             long = list(changed(k, honest[k] * c))
             long[values] = honest[values] / (c if len(vectors) == 2 else c**2)
             yield tuple(long)
@@ -300,33 +292,23 @@ def lies(honest, rng):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_lying_eigenvalue_routine_never_yields_a_false_enclosure(seed, monkeypatch):
+@pytest.mark.parametrize("name", ["eigh", "svd"])
+def test_a_lying_routine_never_yields_a_false_enclosure(name, seed, monkeypatch):
     rng = np.random.default_rng(seed)
-    m = symmetric(seed, "plain", 3)[None]
-    exact = exact_eigenvalues(m[0])
-    told = 0
-    for answer in lies(tuple(EIGH(m)), rng):
-        monkeypatch.setattr(np.linalg, "eigh", lambda _, answer=answer: answer)
-        found = eigenvalues(Interval.exact(m))
-        assert not np.isnan(found.lo).any()
-        assert not np.isnan(found.hi).any()
-        for k, value in enumerate(exact):
-            assert holds(value, found.lo[0, k], found.hi[0, k])
-        told += 1
-    assert told >= 12
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_a_lying_singular_value_routine_never_yields_a_false_enclosure(seed, monkeypatch):
-    rng = np.random.default_rng(seed)
-    m = rng.standard_normal((1, 3, 2))
-    top = exact_norm(m[0])
-    for answer in lies(tuple(SVD(m, full_matrices=False)), rng):
-        monkeypatch.setattr(np.linalg, "svd", lambda *_, answer=answer, **__: answer)
-        found = spectral_norm(Interval.exact(m))
-        assert not np.isnan(found.lo).any()
-        assert not np.isnan(found.hi).any()
-        assert holds(top, found.lo[0], found.hi[0])
+    if name == "eigh":
+        m = symmetric(seed, "plain", 3)[None]
+        exact, bound, honest = exact_eigenvalues(m[0]), eigenvalues, EIGH(m)
+    else:
+        m = rng.standard_normal((1, 3, 2))
+        exact, bound, honest = [exact_norm(m[0])], spectral_norm, SVD(m, full_matrices=False)
+    answers = [*lies(tuple(honest), rng)]
+    assert len(answers) >= 12
+    for answer in answers:
+        monkeypatch.setattr(np.linalg, name, lambda *_, answer=answer, **__: answer)
+        found = bound(Interval.exact(m))
+        assert not np.isnan([found.lo, found.hi]).any()
+        for value, lo, hi in zip(exact, found.lo.ravel(), found.hi.ravel(), strict=True):
+            assert holds(value, lo, hi)
 
 
 @given(seed=SEEDS)
@@ -339,13 +321,6 @@ def test_false_enclosures_would_be_noticed(seed):
     assert not all(holds(v, found.lo[0, k] + 1e-3, found.hi[0, k] + 1e-3) for k, v in enumerate(exact))
 
 
-@pytest.mark.parametrize("name", ["congruence", "product"])
-def test_forgotten_roundings_are_noticed(name, monkeypatch):
-    monkeypatch.setattr(linalg, "_gamma", lambda k: 0.0)
-    honest = {"congruence": exact_congruence, "product": exact_product}[name]
-    assert sum(not honest(seed) for seed in range(20)) > 10
-
-
 def exact_congruence(seed):
     rng = np.random.default_rng(seed)
     t, s = rng.standard_normal((3, 3)), symmetric(seed, "plain", 3)
@@ -356,6 +331,12 @@ def exact_product(seed):
     rng = np.random.default_rng(seed)
     a, b = rng.standard_normal((3, 3)), rng.standard_normal((3, 3))
     return covers(balls(a) * balls(b), *product((a, np.zeros_like(a)), (b, np.zeros_like(b))))
+
+
+@pytest.mark.parametrize("covered", [exact_congruence, exact_product])
+def test_forgotten_roundings_are_noticed(covered, monkeypatch):
+    monkeypatch.setattr(linalg, "_gamma", lambda k: 0.0)
+    assert sum(not covered(seed) for seed in range(20)) > 10
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -373,11 +354,6 @@ def test_radii_of_products_are_not_less_than_what_they_are_summed_from(seed, sca
     for i, j in np.ndindex(3, 3):
         terms = ((Fraction(a[i, k]) + Fraction(ra[i, k])) * Fraction(rb[k, j]) for k in range(3))
         assert Fraction(rad[i, j]) >= sum(terms)
-
-
-def covers(exact, mid, rad):
-    places = np.ndindex(mid.shape)
-    return all(abs(exact[i, j] - arb(float(mid[i, j]))) <= arb(float(rad[i, j])) for i, j in places)
 
 
 def test_thin_matrices_have_thin_norms():

@@ -291,22 +291,26 @@ class Judge:
         try:
             spec = load_text(text, "case.yaml")
         except TubecertError as error:
-            self._findings(error.findings, located=True)
+            self._findings(error.findings, text)
             return f"refused {error.findings[0].code}"
         self._accepted(spec, text)
         findings = pipeline.inspect(spec, budget=self.budget)
-        self._findings(findings, located=False)
+        self._findings(findings)
         return f"lint {findings[0].code}" if findings else "clean"
 
-    def _findings(self, findings: Any, *, located: bool) -> None:
+    def _findings(self, findings: Any, refused: str | None = None) -> None:
         if self.pages is None:
             from tubecert.report import pages
 
             self.pages = pages.codes()
-        assert findings or not located, "refused without a reason"
+        assert findings or refused is None, "refused without a reason"
         for item in findings:
             assert item.code in self.pages, item.code
-            assert item.location is not None or not located, str(item)
+            if refused is not None:
+                lines = re.split(r"\r\n|\r|\n", refused)
+                assert item.location is not None, str(item)
+                assert 1 <= item.location.line <= len(lines), str(item)
+                assert 1 <= item.location.column <= len(lines[item.location.line - 1]) + 1, str(item)
             assert str(item).isprintable() or "\n" in str(item)
             assert not set(map(ord, str(item))) & (set(range(32)) - {10}), "a control character"
 

@@ -20,8 +20,6 @@ from systems import SCALAR, SMALL
 
 import tubecert
 from tubecert import certificate, spec
-from tubecert.bounds.constants import DERIVED, TABLE, WIND
-from tubecert.bounds.meanings import EVERY
 from tubecert.certificate.result import Certificate
 from tubecert.errors import TubecertError
 from tubecert.spec.load import load, load_question, load_system, load_text
@@ -333,10 +331,6 @@ def test_what_is_no_certificate_does_not_fit(change):
     assert not [e for e in errors("certificate", sealed) if "hash" not in e]
     sealed["result"].update(change)
     assert [e for e in errors("certificate", sealed) if "hash" not in e]
-
-
-def test_constants_are_explained_elsewhere():
-    assert len(EVERY) == len(TABLE) + len(WIND) + len(DERIVED)
 
 
 # reference
