@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from tubecert.expression import constant, cos, norm, parse, sin, symbol
+from tubecert.expression.matrix import identity
 from tubecert.model import ControlAffineModel
 from tubecert.trajectory import Plan, constant_plan
 
@@ -61,32 +62,39 @@ def plain_model(states: Sequence[str], f: Sequence[str], B: Sequence[Sequence[st
     )
 
 
+def model_of(
+    states: Sequence[str], f: Sequence[str], B: Any, W: Any = None, rate: str = "1", *, h: Any = None
+) -> ControlAffineModel:
+    """x' = f + B u, with one input u or inputs u1, u2, ...; without W that is the identity."""
+    names = tuple(states)
+    count = len(B[0])
+    return ControlAffineModel(
+        states=names,
+        inputs=("u",) if count == 1 else tuple(f"u{j + 1}" for j in range(count)),
+        f=matrix_of([f], names)[0],
+        B=matrix_of(B, names),
+        W=identity(len(names)) if W is None else matrix_of(W, names),
+        rate=Fraction(rate),
+        h=h,
+    )
+
+
+def at_rest(*x: str, inputs: int = 1) -> Plan:
+    """The plan that stays at a point, with no input."""
+    return constant_plan([Fraction(e) for e in x], [Fraction(0)] * inputs, None)
+
+
 def three_state(
     W: Any = None, rate: str = "0.9999", f: Sequence[str] = F_THREE, B: Any = None
 ) -> ControlAffineModel:
-    t = symbol("t")
-    return ControlAffineModel(
-        states=THREE,
-        inputs=("u",),
-        f=matrix_of([f], THREE)[0],
-        B=matrix_of(B or [["0"], ["0"], ["1"]], THREE),
-        W=matrix_of(polynomial_three() if W is None else W, THREE),
-        rate=Fraction(rate),
-        h=(constant(Fraction(1, 10)) * sin(2 * t),),
-    )
+    h = (constant(Fraction(1, 10)) * sin(2 * symbol("t")),)
+    return model_of(THREE, f, B or [["0"], ["0"], ["1"]], polynomial_three() if W is None else W, rate, h=h)
 
 
 def two_state(W: Any = None, rate: str = "1.74") -> ControlAffineModel:
     t, x1, x2 = symbol("t"), symbol("x1"), symbol("x2")
-    return ControlAffineModel(
-        states=TWO,
-        inputs=("u",),
-        f=matrix_of([F_TWO], TWO)[0],
-        B=matrix_of([["0.5"], ["-2"]], TWO),
-        W=matrix_of(W_TWO if W is None else W, TWO),
-        rate=Fraction(rate),
-        h=(-2 * sin(2 * t) - constant(Fraction(1, 10)) * norm([x1, x2]),),
-    )
+    h = (-2 * sin(2 * t) - constant(Fraction(1, 10)) * norm([x1, x2]),)
+    return model_of(TWO, F_TWO, [["0.5"], ["-2"]], W_TWO if W is None else W, rate, h=h)
 
 
 def scaled(rows: Sequence[Sequence[str]], factor: str) -> list[list[str]]:
@@ -95,7 +103,7 @@ def scaled(rows: Sequence[Sequence[str]], factor: str) -> list[list[str]]:
 
 def resting() -> Plan:
     """The three-state system at the origin."""
-    return constant_plan([Fraction(0)] * 3, [Fraction(0)], None)
+    return at_rest("0", "0", "0")
 
 
 def moving() -> Plan:

@@ -8,7 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flint import arb, ctx
-from systems import moving, polynomial_three, resting, scaled, three_forms, three_state, two_forms
+from systems import (
+    TWO,
+    at_rest,
+    model_of,
+    moving,
+    polynomial_three,
+    resting,
+    scaled,
+    three_forms,
+    three_state,
+    two_forms,
+)  # fmt: skip
 from systems import two_state as two_state_model
 
 from tubecert.bounds.compute import bound_constants, least_radius, time_range
@@ -329,38 +340,18 @@ def test_the_feedback_gain_of_the_sheet():
 
 
 def test_a_contracting_system_needs_no_feedback():
-    from systems import matrix_of
-
-    from tubecert.model import ControlAffineModel
-
-    names = ("x1", "x2")
-    model = ControlAffineModel(
-        states=names, inputs=("u",), f=matrix_of([["-2*x1", "-2*x2"]], names)[0], B=matrix_of([["1"], ["1"]], ()),
-        W=matrix_of([["1", "0"], ["0", "1"]], ()), rate=Fraction(1), h=None,
-    )  # fmt: skip
-    from tubecert.trajectory import constant_plan
-
-    plan = constant_plan([Fraction(0)] * 2, [Fraction(0)], None)
-    found = Suprema(model, plan, 0.5, None, Effort(budget=50_000)).feedback_gain()
+    model = model_of(TWO, ["-2*x1", "-2*x2"], [["1"], ["1"]])
+    found = Suprema(model, at_rest("0", "0"), 0.5, None, Effort(budget=50_000)).feedback_gain()
     assert 0 <= found.below <= found.above < 1e-9
 
 
 @pytest.mark.slow
 def test_the_feedback_gain_of_a_moving_input_is_found_where_the_metric_nearly_attains_its_rate():
-    """Without 2.1a it was infinite after 30 000 boxes: near mu = 0 a bound needs more margin of C2 than there is."""
-    from systems import matrix_of
-
-    from tubecert.model import ControlAffineModel
-    from tubecert.trajectory import constant_plan
-
-    names = ("x1", "x2")
-    model = ControlAffineModel(
-        states=names, inputs=("u",), f=matrix_of([["-x1 + x2 - (x1 - x2)**3/3", "x1"]], names)[0],
-        B=matrix_of([["0"], ["1 + x1**2/4"]], names), W=matrix_of([["1", "-1/2"], ["-1/2", "1"]], ()),
-        rate=Fraction("1.49999"), h=None,
-    )  # fmt: skip
-    plan = constant_plan([Fraction(0)] * 2, [Fraction(0)], None)
-    found = Suprema(model, plan, 0.5, None, Effort(gap=0.02, budget=3000)).feedback_gain()
+    """Near mu = 0 a bound needs more margin of C2 than there is: it is 2.1a that bounds it."""
+    f, B = ["-x1 + x2 - (x1 - x2)**3/3", "x1"], [["0"], ["1 + x1**2/4"]]
+    model = model_of(TWO, f, B, [["1", "-1/2"], ["-1/2", "1"]], "1.49999")
+    effort = Effort(gap=0.02, budget=3000)
+    found = Suprema(model, at_rest("0", "0"), 0.5, None, effort).feedback_gain()
 
     def sampled(points):
         x, v = points[:, :2], points[:, 2:]
@@ -376,17 +367,8 @@ def test_the_feedback_gain_of_a_moving_input_is_found_where_the_metric_nearly_at
 
 def test_the_feedback_gain_of_as_many_moving_inputs_as_states_needs_no_null_space():
     """There is none to span. F = 2 (f' + rate) and W = 1, so that du = sup (f' + rate)/b."""
-    from systems import matrix_of
-
-    from tubecert.model import ControlAffineModel
-    from tubecert.trajectory import constant_plan
-
-    model = ControlAffineModel(
-        states=("x1",), inputs=("u",), f=matrix_of([["x1**2"]], ("x1",))[0], B=matrix_of([["2 + x1"]], ("x1",)),
-        W=matrix_of([["1"]], ()), rate=Fraction(3), h=None,
-    )  # fmt: skip
-    plan = constant_plan([Fraction(0)], [Fraction(0)], None)
-    found = Suprema(model, plan, 0.5, None, Effort(gap=0.01, budget=500)).feedback_gain()
+    model = model_of(("x1",), ["x1**2"], [["2 + x1"]], rate="3")
+    found = Suprema(model, at_rest("0"), 0.5, None, Effort(gap=0.01, budget=500)).feedback_gain()
     # (2 x + 3)/(2 + x) grows with x
     assert found.below <= 4 / 2.5 <= found.above <= 1.02 * 4 / 2.5
 
@@ -447,21 +429,12 @@ def test_a_smaller_tube_has_no_larger_constants(two):
 
 @pytest.mark.slow
 def test_permuted_states_have_the_same_constants(three):
-    from tubecert.model import ControlAffineModel
-
     suprema, plain, _, spec = three
     order = (2, 0, 1)
     m = suprema.model
-    model = ControlAffineModel(
-        states=tuple(m.states[i] for i in order),
-        inputs=m.inputs,
-        f=tuple(m.f[i] for i in order),
-        B=tuple(m.B[i] for i in order),
-        W=tuple(tuple(m.W[i][j] for j in order) for i in order),
-        rate=m.rate,
-        h=m.h,
-    )
-    other = replace(suprema, model=model)
+    states, f, B = (tuple(of[i] for i in order) for of in (m.states, m.f, m.B))
+    W = tuple(tuple(m.W[i][j] for j in order) for i in order)
+    other = replace(suprema, model=replace(m, states=states, f=f, B=B, W=W))
     found = bound_constants(other, KnownStart(tuple(spec.x0[i] for i in order)), other.metric_bounds(), {})
     for name, constant, _ in plain.items():
         changed = getattr(found, name)

@@ -6,12 +6,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import sympy
-from systems import matrix_of
+from systems import at_rest, model_of
 
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.model import ControlAffineModel
-from tubecert.trajectory import constant_plan
 
 NAMES = ("x1", "x2", "x3")
 SYMBOLS = sympy.symbols(NAMES)
@@ -100,18 +98,8 @@ def values_at(at, x, rng):
 def test_constants_of_random_systems_are_above_sampled_ones(moving_input, seed):
     rng = np.random.default_rng(seed)
     f, B, W = random_texts(rng, moving_input=moving_input)
-    rate = Fraction(1, 4)
-    model = ControlAffineModel(
-        states=NAMES,
-        inputs=("u1", "u2"),
-        f=matrix_of([f], NAMES)[0],
-        B=matrix_of(B, NAMES),
-        W=matrix_of(W, NAMES),
-        rate=rate,
-        h=None,
-    )
-    plan = constant_plan(CENTRE, [Fraction(0)] * 2, None)
-    s = Suprema(model, plan, RHO, None, Effort(budget=60_000, cheap=300))
+    model = model_of(NAMES, f, B, W, "1/4")
+    s = Suprema(model, at_rest(*CENTRE, inputs=2), RHO, None, Effort(budget=60_000, cheap=300))
     lower, upper = s.metric_bounds()
     found = {
         "f": s.norms("f", [tuple((e,) for e in model.f)]),
@@ -125,7 +113,7 @@ def test_constants_of_random_systems_are_above_sampled_ones(moving_input, seed):
         "upper": upper,
         "feedback_gain": s.feedback_gain(),
     }
-    at = functions_of(f, B, W, float(rate))
+    at = functions_of(f, B, W, float(model.rate))
     direction = rng.standard_normal((20_000, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     reach = np.where(rng.random((20_000, 1)) < 0.6, 1.0, rng.random((20_000, 1)))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import fractions
-from systems import matrix_of
+from systems import model_of
 
 from tubecert.bounds.level import Proposed, greatest_level, least_level, settled
 from tubecert.bounds.start import KnownStart, StartWithin
@@ -46,15 +46,8 @@ def model(**changes) -> ControlAffineModel:
         "h": ["0.2*sin(t)*x1 + 0.1*norm(x2, x3)", "0.3*x2"],
     } | changes
     places = {name: symbol(name) for name in (*NAMES, "t")}
-    return ControlAffineModel(
-        states=NAMES,
-        inputs=("u1", "u2"),
-        f=matrix_of([own["f"]], NAMES)[0],
-        B=matrix_of(own["B"], NAMES),
-        W=matrix_of(own["W"], NAMES),
-        rate=Fraction(1, 10),
-        h=tuple(parse(text, symbols=places, kinks=True).expression for text in own["h"]),
-    )
+    h = tuple(parse(text, symbols=places, kinks=True).expression for text in own["h"])
+    return model_of(NAMES, own["f"], own["B"], own["W"], "1/10", h=h)
 
 
 CONSTANT_W = [["2", "-0.2", "0.1"], ["-0.2", "0.04", "0"], ["0.1", "0", "30"]]

@@ -13,19 +13,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rechecked
-from systems import matrix_of
+from systems import at_rest, matrix_of, model_of
 
 from tubecert.bounds import linear
 from tubecert.bounds.suprema import Suprema
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.model import ControlAffineModel
 from tubecert.recheck import linear as again
 from tubecert.recheck.coordinates import Coordinates as OwnCoordinates
 from tubecert.recheck.curve import expressed
 from tubecert.recheck.place import Place
 from tubecert.recheck.terms import number
-from tubecert.trajectory import constant_plan
 
 NAMES = ("x", "y", "z", "w")
 CENTRE = (Fraction(1, 10), Fraction(0), Fraction(-1, 5), Fraction(0))
@@ -39,18 +37,10 @@ VECTORS = {
 
 
 def suprema():
-    nothing = [[str(int(i == j)) for j in range(4)] for i in range(4)]
-    model = ControlAffineModel(
-        states=NAMES,
-        inputs=("u",),
-        f=matrix_of([["0"] * 4], NAMES)[0],
-        B=matrix_of([["0"], ["0"], ["0"], ["1"]], NAMES),
-        W=matrix_of(nothing, NAMES),
-        rate=Fraction(1),
-        h=None,
+    model = model_of(NAMES, ["0"] * 4, [["0"], ["0"], ["0"], ["1"]])
+    start = Suprema(
+        model, at_rest(*CENTRE), 0.0, None, Effort(), coordinates=Coordinates(tuple(map(tuple, exact(S))))
     )
-    plan = constant_plan(CENTRE, (Fraction(0),), None)
-    start = Suprema(model, plan, 0.0, None, Effort(), coordinates=Coordinates(tuple(map(tuple, exact(S)))))
     return start.with_radius(RHO, (Fraction(9),) * 4)
 
 

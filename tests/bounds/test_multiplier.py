@@ -7,15 +7,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from systems import matrix_of
+from systems import at_rest, matrix_of, model_of
 
 from tubecert.bounds import multiplier
 from tubecert.bounds.suprema import Suprema
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import parse, symbol
-from tubecert.model import ControlAffineModel
-from tubecert.trajectory import Plan, constant_plan
+from tubecert.trajectory import Plan
 
 NAMES = ("x", "y", "z")
 RHO = Fraction(1, 2)
@@ -29,16 +28,8 @@ VECTORS = {"ridge": RIDGE, "bent": ["sin(2*x) + y", "y*z - x"], "one state": ["s
 
 
 def suprema(coordinates=True, plan=None, **fields):
-    model = ControlAffineModel(
-        states=NAMES,
-        inputs=("u",),
-        f=matrix_of([["0"] * 3], NAMES)[0],
-        B=matrix_of([["0"], ["0"], ["1"]], NAMES),
-        W=matrix_of([[str(int(i == j)) for j in range(3)] for i in range(3)], NAMES),
-        rate=Fraction(1),
-        h=None,
-    )
-    plan = plan or constant_plan((Fraction(1, 10), Fraction(0), Fraction(-1, 5)), (Fraction(0),), None)
+    model = model_of(NAMES, ["0"] * 3, [["0"], ["0"], ["1"]])
+    plan = plan or at_rest("1/10", "0", "-1/5")
     own = Coordinates(S) if coordinates else None
     return Suprema(model, plan, 0.0, None, Effort(), coordinates=own, **fields).with_radius(
         RHO, (Fraction(9),) * 3

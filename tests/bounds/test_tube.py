@@ -12,13 +12,13 @@ from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import fractions
+from systems import at_rest, model_of
 
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
 from tubecert.expression import PI, Expression, constant, parse, symbol
-from tubecert.model import ControlAffineModel
-from tubecert.trajectory import Plan, constant_plan
+from tubecert.trajectory import Plan
 from tubecert.tube import Ball, Tube, containment
 
 t, x, y, z, u = (symbol(name) for name in "txyzu")
@@ -210,19 +210,8 @@ def test_a_plan_encloses_itself_over_a_window(name, start, width, part):
 
 
 def test_the_defect_of_a_plan_is_exact():
-    f = (-x + z, x**2 - y, -z)
-    model = ControlAffineModel(
-        states=STATES,
-        inputs=("u",),
-        f=f,
-        B=((constant(0),), (constant(0),), (constant(1),)),
-        W=((constant(1),),),
-        rate=Fraction(1),
-        h=None,
-    )
-    assert all(
-        row[0] is constant(0) for row in constant_plan([Fraction(0)] * 3, [Fraction(0)], None).defect(model)
-    )
+    model = model_of(STATES, ["-x + z", "x**2 - y", "-z"], [["0"], ["0"], ["1"]])
+    assert all(row[0] is constant(0) for row in at_rest("0", "0", "0").defect(model))
     defect = plan_of("line").defect(model)
     # x*' = (1/3, -1, 0); f = (-(t/3 - 1) + 1/7, (t/3 - 1)^2 - (2 - t), -1/7); B u = (0, 0, t^2)
     for when in (Fraction(0), Fraction(1), Fraction(5, 2)):
