@@ -14,7 +14,7 @@ from tubecert.certificate import digest
 from tubecert.certificate.result import Result
 from tubecert.cli.belonging import ForeignError
 from tubecert.errors import SpecError
-from tubecert.findings import Finding, Severity
+from tubecert.findings import Finding
 from tubecert.spec import canonical
 
 ROOT = Path(__file__).parents[2]
@@ -399,14 +399,6 @@ def test_errors_bring_their_code(proven):
 # check
 
 
-def test_check_clean(folder):
-    result = run("check", SPEC)
-    assert (result.exit_code, result.stderr) == (0, "")
-    assert result.stdout == "1 specification checked: no errors\n"
-    assert json.loads(run("check", SPEC, "--json").stdout) == []
-    assert not list(folder.iterdir())
-
-
 def test_check_folders(folder):
     (folder / "sub").mkdir()
     (folder / ".hidden").mkdir()
@@ -423,16 +415,6 @@ def test_check_folders(folder):
     [first, *_] = json.loads(run("check", folder, "--json").stdout)
     assert first["code"] == "TC105"
     assert first["file"] == str(folder / "b.yaml")
-
-
-def test_check_mathematics(folder, monkeypatch):
-    warning = Finding(code="TC299", message="odd", severity=Severity.WARNING)
-    error = Finding(code="TC203", message="B loses rank in the safe set, at x1 = 0")
-    for found, code, words in (([warning], 0, "1 warning"), ([warning, error], 1, "1 error, 1 warning")):
-        monkeypatch.setattr(pipeline, "inspect", lambda _, found=found: found)
-        result = run("check", SPEC, "--no-cache")
-        assert result.exit_code == code
-        assert result.stdout.endswith(f"1 specification checked: {words}\n")
 
 
 # the real thing

@@ -45,9 +45,8 @@ def files(tmp_path):
 
 
 def told(*results):
-    return Comparison.of(
-        [(f"{i}.json", Certificate.from_json(seal(each, {}))) for i, each in enumerate(results)]
-    )
+    sides = [(f"{i}.json", Certificate.from_json(seal(each, {}))) for i, each in enumerate(results)]
+    return Comparison.of(sides)
 
 
 def test_a_table_names_gains_changes_what_is_missing_and_what_differs(files):
@@ -67,32 +66,21 @@ def test_a_table_names_gains_changes_what_is_missing_and_what_differs(files):
 
 
 def test_formats_have_every_number_as_the_certificate_states_it(files):
-    rows = {
-        row["quantity"]: row
-        for row in csv.DictReader(io.StringIO(run("compare", *files, "--format", "csv").output))
-    }
+    table = csv.DictReader(io.StringIO(run("compare", *files, "--format", "csv").output))
+    rows = {row["quantity"]: row for row in table}
     data = json.loads(run("compare", *files, "--json").output)
     assert [each["name"] for each in data["certificates"]] == ["before", "after"]
     for path, name in zip(files, ("before", "after"), strict=True):
         result = json.loads(path.read_text(encoding="utf-8"))["result"]
-        index = ["before", "after"].index(name)
+        index, least = ["before", "after"].index(name), result["distance"]["least_adaptation"]
         for key, number in (
             ("rho", result["tube"]["rho"]),
-            (
-                "distance.least_adaptation.adaptation_rate",
-                result["distance"]["least_adaptation"]["adaptation_rate"],
-            ),
-            (
-                "distance.least_adaptation.margin.distance",
-                result["distance"]["least_adaptation"]["margin"][0],
-            ),
+            ("distance.least_adaptation.adaptation_rate", least["adaptation_rate"]),
+            ("distance.least_adaptation.margin.distance", least["margin"][0]),
         ):
             assert float(rows[key][name]) == data["quantities"][key][index] == number
-    assert rows["conditions_26.verdict"] == {
-        "quantity": "conditions_26.verdict",
-        "before": "certified",
-        "after": "",
-    }
+    verdicts = rows["conditions_26.verdict"]
+    assert (verdicts["before"], verdicts["after"]) == ("certified", "")
     assert rows["specification.trajectory.horizon"]["after"] == "10"
     assert data["differences"]["trajectory.horizon"] == [None, "10"]
 
@@ -129,26 +117,17 @@ def test_a_page_has_a_dot_for_every_value_hollow_where_it_is_not_certified(files
         assert all(name.startswith("dot n2") for name in hollow)
         if figure.title in ("Tube", "Γ"):
             assert hollow
-    done = run(
-        "compare",
-        *files,
-        "-o",
-        tmp_path / "page.html",
-        "-o",
-        tmp_path / "page.md",
-        "-o",
-        tmp_path / "page.csv",
-    )
+    targets = [word for ending in ("html", "md", "csv") for word in ("-o", tmp_path / f"page.{ending}")]
+    done = run("compare", *files, *targets)
     assert done.exit_code == 0, done.output
     assert (tmp_path / "page.html").read_text(encoding="utf-8").count("<figure ") == len(figures.figures)
 
 
 def test_files_of_one_name_are_told_apart(tmp_path):
+    text = dump(seal(certificates.certified(), {}))
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "c.certificate.json").write_text(
-            dump(seal(certificates.certified(), {})), encoding="utf-8"
-        )
+        (tmp_path / name / "c.certificate.json").write_text(text, encoding="utf-8")
     done = run("compare", tmp_path / "one/c.certificate.json", tmp_path / "two/c.certificate.json", "--json")
     names = [each["name"] for each in json.loads(done.output)["certificates"]]
     assert names == [str(tmp_path / "one/c"), str(tmp_path / "two/c")]
@@ -164,9 +143,7 @@ def test_lists_of_other_sizes_differ_as_a_whole():
 
 def test_what_cannot_be_compared_is_refused(files, tmp_path):
     broken = tmp_path / "broken.json"
-    broken.write_text(
-        files[0].read_text(encoding="utf-8").replace("certified", "refuted", 1), encoding="utf-8"
-    )
+    broken.write_text(files[0].read_text("utf-8").replace("certified", "refuted", 1), "utf-8")
     for words, said in (
         ((files[0],), "two certificates or more"),
         ((files[0], broken), "TC601"),

@@ -126,8 +126,10 @@ def loaded_by(statement: str) -> set[str]:
 @pytest.mark.parametrize("statement", [
     "import tubecert.cli",
     "from typer.testing import CliRunner; from tubecert.cli.app import app; CliRunner().invoke(app, ['--help'])",
-    "import tubecert as tc; dir(tc); tc.TubecertError, tc.Verdict", "import tubecert.expression",
+    "import tubecert as tc; dir(tc); tc.TubecertError, tc.Verdict",
+    "import tubecert.expression",
     "import tubecert.errors, tubecert.findings",
+    "from tubecert.report import pages; pages.find('TC302').text()",
 ])  # fmt: skip
 def test_heavy_libraries_come_late(statement):
     assert not loaded_by(statement) & HEAVY
