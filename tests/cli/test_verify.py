@@ -167,30 +167,23 @@ def _mat(folder, **arrays):
     return folder / "given.mat"
 
 
+LAST = np.moveaxis(np.array([ONE, SQUARE]), 0, -1)
 WRITERS = {
     "json": lambda f: _json(f, {"coefficients": [ONE, SQUARE], "monomials": ["1", "x**2"], "rate": "1"}),
     "json powers": lambda f: _json(f, {"coefficients": [ONE, SQUARE], "powers": [[0, 0], [2, 0]], "rate": 1}),
     "csv": lambda f: _csv(f, [ONE, SQUARE], ["1", "x**2"]),
-    "npz": lambda f: _npz(f, coefficients=np.array([ONE, SQUARE]), monomials=np.array(["1", "x**2"]), rate=1.0),
-    "npz powers": lambda f: _npz(f, coefficients=np.array([ONE, SQUARE]), powers=np.array([[0, 0], [2, 0]])),
-    "mat": lambda f: _mat(
-        f,
-        coefficients=np.moveaxis(np.array([ONE, SQUARE]), 0, -1),
-        monomials=np.array(["1", "x**2"], dtype=object),
-        rate=1.0,
-    ),
-    "mat powers": lambda f: _mat(f, coefficients=np.moveaxis(np.array([ONE, SQUARE]), 0, -1), powers=[[0, 0], [2, 0]]),
-}  # fmt: skip
+    "npz": lambda f: _npz(f, coefficients=[ONE, SQUARE], monomials=["1", "x**2"], rate=1.0),
+    "npz powers": lambda f: _npz(f, coefficients=[ONE, SQUARE], powers=[[0, 0], [2, 0]]),
+    "mat": lambda f: _mat(f, coefficients=LAST, monomials=np.array(["1", "x**2"], dtype=object), rate=1.0),
+    "mat powers": lambda f: _mat(f, coefficients=LAST, powers=[[0, 0], [2, 0]]),
+}
 
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_every_format_is_the_same_metric(folder, name):
     spec = load_system(str(folder / "bent.yaml"))
-    written = {
-        "format": "tubecert-metric/1",
-        "rate": 1,
-        "dual_metric": [["1 + 0.25*x**2", "-0.5"], ["-0.5", "2 + 0.125*x**2"]],
-    }
+    W = [["1 + 0.25*x**2", "-0.5"], ["-0.5", "2 + 0.125*x**2"]]
+    written = {"format": "tubecert-metric/1", "rate": 1, "dual_metric": W}
     reference = with_metric(spec, str(_json(folder, written, "reference.json")))
     path = WRITERS[name](folder)
     found = with_metric(spec, str(path), None if "rate" in path.read_text("latin-1") else 1)
@@ -211,10 +204,8 @@ def test_floats_are_their_shortest_decimals_and_texts_are_exact(folder):
 def test_a_csv_of_numbers_alone_is_a_constant_dual_metric(folder):
     spec = load_system(str(folder / "bent.yaml"))
     found = with_metric(spec, str(_text(folder, "rows.csv", "1e0, -0.5\n-0.5,2\n")), 1)
-    assert [[str(e.expression.fraction) for e in row] for row in found.metric.dual_metric] == [
-        ["1", "-1/2"],
-        ["-1/2", "2"],
-    ]
+    rows = [[str(e.expression.fraction) for e in row] for row in found.metric.dual_metric]
+    assert rows == [["1", "-1/2"], ["-1/2", "2"]]
     with pytest.raises(SpecError, match="not symmetric"):
         with_metric(spec, str(_text(folder, "rows.csv", "1,0.5\n-0.5,2\n")), 1)
 
@@ -235,25 +226,27 @@ class Bomb:
 
 def _bad(folder):
     good = {"coefficients": W, "rate": 1}
-    yield "no rate", _json(folder, {"coefficients": W}, "a.json")
-    yield "unknown key", _json(folder, good | {"lambda": 1}, "b.json")
-    yield "shape", _json(folder, good | {"coefficients": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "c.json")
-    yield "ragged", _json(folder, good | {"coefficients": [[1, 0], [0]]}, "d.json")
-    yield "no number", _json(folder, good | {"coefficients": [[1, None], [None, 1]]}, "e.json")
+    for why, content in {
+        "no rate": {"coefficients": W},
+        "unknown key": good | {"lambda": 1},
+        "shape": good | {"coefficients": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]},
+        "ragged": good | {"coefficients": [[1, 0], [0]]},
+        "no number": good | {"coefficients": [[1, None], [None, 1]]},
+        "huge": good | {"coefficients": [["1e999999999", 0], [0, 1]]},
+        "monomials": good | {"coefficients": [W, W], "monomials": ["1"]},
+        "both": good | {"monomials": ["1"], "powers": [[0, 0]]},
+        "half power": good | {"powers": [[0.5, 0]]},
+        "negative power": good | {"powers": [[-1, 0]]},
+        "two in one": good | {"monomials": ["1) + (x1"]},
+        "stranger": good | {"monomials": ["z"]},
+        "negative rate": good | {"rate": -1},
+    }.items():
+        yield why, _json(folder, content, f"{why}.json")
+    yield "deep", _text(folder, "deep.json", '{"coefficients": ' + "[" * 5000)
     yield "nan", _npz(folder, coefficients=np.array([[np.nan, 0], [0, 1]]), rate=1.0)
-    yield "huge", _json(folder, good | {"coefficients": [["1e999999999", 0], [0, 1]]}, "f.json")
-    yield "monomials", _json(folder, good | {"coefficients": [W, W], "monomials": ["1"]}, "g.json")
-    yield "both", _json(folder, good | {"monomials": ["1"], "powers": [[0, 0]]}, "h.json")
-    yield "half power", _json(folder, good | {"powers": [[0.5, 0]]}, "i.json")
-    yield "negative power", _json(folder, good | {"powers": [[-1, 0]]}, "j.json")
-    yield "two in one", _json(folder, good | {"monomials": ["1) + (x1"]}, "k.json")
-    yield "stranger", _json(folder, good | {"monomials": ["z"]}, "l.json")
-    yield "negative rate", _json(folder, good | {"rate": -1}, "m.json")
-    yield "deep", _text(folder, "n.json", '{"coefficients": ' + "[" * 5000)
     yield "csv header", _text(folder, "o.csv", "a,b\n1,2\n")
-    yield "csv row", _text(folder, "p.csv", "monomial,row,column,value\n1,1,3,2\n")
-    yield "csv twice", _text(folder, "q.csv", "monomial,row,column,value\n1,1,1,2\n1,1,1,2\n")
-    yield "csv cell", _text(folder, "r.csv", "monomial,row,column,value\n1,1,1,x\n")
+    for why, cells in (("row", "1,1,3,2"), ("twice", "1,1,1,2\n1,1,1,2"), ("cell", "1,1,1,x")):
+        yield f"csv {why}", _text(folder, f"{why}.csv", f"monomial,row,column,value\n{cells}\n")
     yield "no zip", _text(folder, "s.npz", "PK")
     yield "no mat", _text(folder, "t.mat", "MATLAB 5.0 MAT-file" + " " * 200)
     yield "hdf5", _text(folder, "u.mat", "MATLAB 7.3 MAT-file".ljust(124) + "\x00\x02IM" + " " * 200)

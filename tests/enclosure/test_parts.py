@@ -114,6 +114,10 @@ def test_progress_goes_on_and_ends_with_all_boxes(short):
     assert all(step.above >= found.below for step in told)
 
 
+def polynomial(c, x, y, z):
+    return sum(a * b for a, b in zip(c[:-1], (x, x * y, z**2, x * z, y**2, x * y * z, y), strict=True)) + c[7]
+
+
 numbers = st.integers(-8, 8).map(lambda k: number(str(k / 4)))
 
 
@@ -121,16 +125,7 @@ numbers = st.integers(-8, 8).map(lambda k: number(str(k / 4)))
 @given(st.lists(numbers, min_size=8, max_size=8), st.integers(1, 200), st.integers(1, 9))
 @settings(max_examples=15, deadline=None)
 def test_random_searches_enclose_their_supremum(c, alone, parts):
-    e = (
-        c[0] * x
-        + c[1] * x * y
-        + c[2] * z**2
-        + c[3] * x * z
-        + c[4] * y**2
-        + c[5] * y * z * x
-        + c[6] * y
-        + c[7]
-    )
+    e = polynomial(c, x, y, z)
     domain = box(x=(-1, 2), y=(-1, 1), z=(0, 1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bnb, "_ALONE", alone)
@@ -138,22 +133,10 @@ def test_random_searches_enclose_their_supremum(c, alone, parts):
         found = supremum(scalar(e), domain, Effort(gap=1e-2, budget=30_000))
     k = [float(each.fraction) for each in c]
     X, Y, Z = np.meshgrid(np.linspace(-1, 2, 25), np.linspace(-1, 1, 25), np.linspace(0, 1, 25))
-    values = (
-        k[0] * X
-        + k[1] * X * Y
-        + k[2] * Z**2
-        + k[3] * X * Z
-        + k[4] * Y**2
-        + k[5] * X * Y * Z
-        + k[6] * Y
-        + k[7]
-    )
-    assert values.max() <= found.above + 1e-12
+    assert polynomial(k, X, Y, Z).max() <= found.above + 1e-12
     assert found.below <= found.above
     at = [found.at.get(name, 0.0) for name in "xyz"]
-    value = k[0] * at[0] + k[1] * at[0] * at[1] + k[2] * at[2] ** 2 + k[3] * at[0] * at[2] + k[4] * at[1] ** 2
-    value += k[5] * at[0] * at[1] * at[2] + k[6] * at[1] + k[7]
-    assert value == pytest.approx(found.below, abs=1e-9)
+    assert polynomial(k, *at) == pytest.approx(found.below, abs=1e-9)
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,18 @@
-"""How much of the package is strings where a type could be: python tests/house/counts.py [PACKAGE] [--where NAME]
+"""How much of the package is strings where a type could be.
 
-Counted in the syntax tree, so that comments and docstrings do not matter. `recheck` is counted apart: it shares no type
-with the rest. The edge, where strings have their place, is listed in `EDGE`. Names that stand for Any count as it does.
+Counted in the syntax tree, so that comments and docstrings do not matter. `recheck` is left out: it shares no type with
+the rest. The edge, where strings have their place, is listed in `EDGE`. Names that stand for Any count as it does.
 """
 
 from __future__ import annotations
 
 import ast
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 VERDICTS = {"certified", "refuted", "undecided", "proven", "holds", "contradicted", "confirmed"}
-ANY = (
-    "Any",
-    "Json",
-    "Tree",
-)  # `Json` is what the library json reads and writes, `Tree` what canonical data holds
+ANY = ("Any", "Json", "Tree")  # what the library json reads and writes, and what canonical data holds
 EDGE = {  # where data comes in or goes out, and what it is
     "records.py": "records as JSON, and JSON as records",
     "spec/": "YAML, CSV and metric files as a `Spec`; a `Spec` as canonical data",
@@ -66,12 +61,8 @@ def _is_mapping_of_any(node: ast.Subscript) -> bool:
 def _reads_a_key(node: ast.AST) -> bool:
     """`data["key"]` and `data.get("key")`; not where a key is written."""
     if isinstance(node, ast.Subscript):
-        of_a_type = isinstance(node.value, ast.Name) and node.value.id in (
-            "list",
-            "tuple",
-            "type",
-        )  # a forward reference
-        return isinstance(node.ctx, ast.Load) and _is_text(node.slice) and not of_a_type
+        forward = isinstance(node.value, ast.Name) and node.value.id in ("list", "tuple", "type")
+        return isinstance(node.ctx, ast.Load) and _is_text(node.slice) and not forward
     is_get = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "get"
     return is_get and bool(node.args) and _is_text(node.args[0])
 
@@ -89,34 +80,10 @@ def _is_text(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str)
 
 
-def counts(package: Path, *, recheck: bool = False, edge: bool = False) -> Counter[str]:
-    """The counts over a package: without recheck and the edge, or of one of them alone."""
+def counts(package: Path) -> Counter[str]:
+    """The counts over a package, without recheck and the edge."""
     total: Counter[str] = Counter(dict.fromkeys(KINDS, 0))
     for path in sorted(package.rglob("*.py")):
-        name = path.relative_to(package).as_posix()
-        if name.startswith("recheck/") == recheck and name.startswith(tuple(EDGE)) == edge:
+        if not path.relative_to(package).as_posix().startswith(("recheck/", *EDGE)):
             total.update(kind for kind, _ in found(ast.parse(path.read_text(encoding="utf-8"))))
     return total
-
-
-def main() -> None:
-    """Print the table, and with --where every place of one kind."""
-    package = Path(__file__).parents[2] / "tubecert"
-    if len(sys.argv) > 1 and not sys.argv[1].startswith("--"):
-        package = Path(sys.argv[1])
-    own, apart, strings = counts(package), counts(package, recheck=True), counts(package, edge=True)
-    print(f"{'':<40}{'rest':>6}{'edge':>12}{'recheck':>9}")
-    for kind in KINDS:
-        print(f"{kind:<40}{own[kind]:>6}{strings[kind]:>12}{apart[kind]:>9}")
-    if "--where" in sys.argv:
-        wanted = sys.argv[sys.argv.index("--where") + 1]
-        for path in sorted(package.rglob("*.py")):
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            name = path.relative_to(package).as_posix()
-            for kind, line in found(tree):
-                if wanted in kind and not name.startswith(("recheck/", *EDGE)):
-                    print(f"{name}:{line}")
-
-
-if __name__ == "__main__":
-    main()

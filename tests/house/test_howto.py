@@ -7,6 +7,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from test_tutorial import shape
 from typer.testing import CliRunner
 
 from tubecert.cli.app import app
@@ -15,11 +16,6 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs" / "howto").glob("*.md"))
 BLOCK = re.compile(r"```(yaml|sh|text|python)(?: (fails)| title=\"([\w.]+)\")?\n(.*?)```", re.DOTALL)
 TUTORIAL = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "tutorial.md").read_text("utf-8"), re.DOTALL)
-
-
-def shape(line: str) -> str:
-    """A line without its numbers, which may differ in their last digits with other versions."""
-    return re.sub(r"\s+", " ", re.sub(r"\d[\d.]*(e-?\d+)?", "#", line)).strip()
 
 
 @pytest.mark.slow

@@ -7,23 +7,11 @@ from pathlib import Path
 
 import pytest
 import yaml
+from test_blocks import numbers, shape
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "library.md").read_text("utf-8")
 BLOCKS = re.findall(r"```(python|text)\n(.*?)```", PAGE, re.DOTALL)
-
-
-NUMBER = re.compile(r"\d[\d.]*(?:e[-+]?\d+)?")
-
-
-def shape(text: str) -> list[str]:
-    """Lines without the digits of their numbers, which may differ in the last ones with other versions."""
-    return [NUMBER.sub("#", line).rstrip() for line in text.splitlines()]
-
-
-def numbers(text: str) -> list[float]:
-    """The numbers in a text."""
-    return [float(found.rstrip(".")) for found in NUMBER.findall(text)]
 
 
 @pytest.mark.slow
@@ -40,7 +28,7 @@ def test_the_page(tmp_path, monkeypatch, capsys):
             exec(compile(text, "docs/library.md", "exec"), names)
             said = capsys.readouterr().out
         else:
-            assert shape(said) == shape(text), said
+            assert [*map(shape, said.splitlines())] == [*map(shape, text.splitlines())], said
             assert numbers(said) == pytest.approx(numbers(text), rel=0.05, abs=1e-3), said
     written = {path.name for path in tmp_path.iterdir()}
     assert {"stage.png", "stage.html", "stage.certificate.json", "stage.simulation"} <= written
