@@ -327,33 +327,29 @@ def test_constants_in_z_are_above_sampled_ones(coordinates):
     own, rho = model(), Fraction(3, 10)
     sides = (Fraction(1, 10), Fraction(1, 4), Fraction(3, 10))
     start = suprema(own, coordinates, gap=0.02, budget=60_000).with_radius(rho, sides)
-    fields = start.fields
-    lower, upper = start.metric_bounds()
-    h, h_x, _ = start.uncertainty()
-    found = {
-        "f": start.norms("f", [fields.f]),
-        "f_x": start.norms("f_x", [fields.f_x]),
-        "B": start.norms("B", [fields.B]),
-        "B_x": start.norms("B_x", fields.B_x),
-        "b_x": start.norms("b_x", fields.b_x),
-        "B_pinv": start.norms("B_pinv", [fields.B_pinv]),
-        "B_pinv_x": start.norms("B_pinv_x", fields.B_pinv_x),
-        "M_x": start.metric_slope(),
-        "upper": upper,
-        "drift_on_plan": start.drift_on_plan(),
-        "h": h,
-        "h_x": h_x,
-        "feedback_gain": start.feedback_gain(),
-    }
+    found = constants_of(start)
     x = CENTRE + points(coordinates, 0.3, np.array([float(side) for side in sides]), 8000)
     sampled = sampled_in_z(x, np.array(coordinates.rows, dtype=float))
-    assert lower.below <= sampled.pop("lower") * (1 + 1e-9)
+    assert found.pop("lower").below <= sampled.pop("lower") * (1 + 1e-9)
     assert set(sampled) == set(found)
     for name, value in sampled.items():
         assert value <= found[name].above * (1 + 1e-6), name
         assert found[name].below <= found[name].above
         if name != "h_x":  # where its norm vanishes, only a structural bound of it is known
             assert found[name].above <= 1.15 * max(value, 0.0) + 1e-3, name
+
+
+def constants_of(s):
+    fields = s.fields
+    lower, upper = s.metric_bounds()
+    h, h_x, _ = s.uncertainty()
+    of_fields = {
+        "f": [fields.f], "f_x": [fields.f_x], "B": [fields.B], "B_x": fields.B_x, "b_x": fields.b_x,
+        "B_pinv": [fields.B_pinv], "B_pinv_x": fields.B_pinv_x,
+    }  # fmt: skip
+    found = {name: s.norms(name, matrices) for name, matrices in of_fields.items()}
+    found |= {"M_x": s.metric_slope(), "lower": lower, "upper": upper, "drift_on_plan": s.drift_on_plan()}
+    return found | {"h": h, "h_x": h_x, "feedback_gain": s.feedback_gain()}
 
 
 def sampled_in_z(x, S):
@@ -424,21 +420,10 @@ def test_the_identity_by_the_new_path_is_the_old_path():
     eye = Coordinates(rows(np.eye(3, dtype=int).tolist()))
     ball = suprema(own, None, gap=0.01, budget=60_000).with_radius(Fraction(1, 4))
     new = suprema(own, eye, gap=0.01, budget=60_000).with_radius(Fraction(1, 4), (Fraction(9),) * 3)
-    for name, old, found in (
-        ("f", ball.norms("f", [ball.fields.f]), new.norms("f", [new.fields.f])),
-        ("f_x", ball.norms("f_x", [ball.fields.f_x]), new.norms("f_x", [new.fields.f_x])),
-        ("B_x", ball.norms("B_x", ball.fields.B_x), new.norms("B_x", new.fields.B_x)),
-        ("B_pinv_x", ball.norms("", ball.fields.B_pinv_x), new.norms("", new.fields.B_pinv_x)),
-        ("M_x", ball.metric_slope(), new.metric_slope()),
-        ("lower", ball.metric_bounds()[0], new.metric_bounds()[0]),
-        ("upper", ball.metric_bounds()[1], new.metric_bounds()[1]),
-        ("h_x", ball.uncertainty()[1], new.uncertainty()[1]),
-        ("du", ball.feedback_gain(), new.feedback_gain()),
-    ):
-        assert max(old.below, found.below) <= min(old.above, found.above), (
-            name
-        )  # both enclose the same number
-        assert found.above == pytest.approx(old.above, rel=0.011, abs=1e-12), name
+    old, found = constants_of(ball), constants_of(new)
+    for name in old:  # both enclose the same number
+        assert max(old[name].below, found[name].below) <= min(old[name].above, found[name].above), name
+        assert found[name].above == pytest.approx(old[name].above, rel=0.011, abs=1e-12), name
 
 
 # -- vectors that are affine in some states
@@ -448,11 +433,7 @@ LINKS = ("x2", "2*x1 + x3 - 3*sin(x1)", "0.5*x2 - x3 + x1**2")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "f",
-    [LINKS, ("1 + x2", "4*x3", "x1 - x2"), ("x2 + sin(t)", "x1**3", "x3")],
-    ids=["links", "affine", "time"],
-)
+@pytest.mark.parametrize("f", [LINKS, ("1 + x2", "4*x3", "x1 - x2"), ("x2 + sin(t)", "x1**3", "x3")])
 def test_what_is_affine_needs_no_search(f):
     """The norm over the rest of the states, exactly: as by boxes in all of them, and as by samples."""
     own = model(W=CONSTANT_W)
@@ -464,30 +445,23 @@ def test_what_is_affine_needs_no_search(f):
     assert whole is not None
     assert len(set(whole.variables) - {"t"}) < 3
     found, exact = start.norms("f", [moved]), start._over_tube("f", whole)
-    boxes = supremum(
-        SumOfNorms([moved]),
-        Tube(start.plan, start.section, states=NAMES, inputs=(), time=start.time),
-        start.effort,
-    )
+    tube = Tube(start.plan, start.section, states=NAMES, inputs=(), time=start.time)
+    boxes = supremum(SumOfNorms([moved]), tube, start.effort)
     assert max(found.below, boxes.below) <= min(found.above, boxes.above)
     x = CENTRE + points(SKEWED, 0.3, np.full(3, 9.0), 40_000)
     S = np.array(SKEWED.rows, dtype=float)
-    x1, x2, x3 = x.T
-    largest = 0.0
-    for t in np.linspace(0, 7, 60) if f[0].endswith("sin(t)") else (0.0,):
-        own_f = {
-            LINKS: (x2, 2 * x1 + x3 - 3 * np.sin(x1), 0.5 * x2 - x3 + x1**2),
-            ("1 + x2", "4*x3", "x1 - x2"): (1 + x2, 4 * x3, x1 - x2),
-            ("x2 + sin(t)", "x1**3", "x3"): (x2 + np.sin(t), x1**3, x3),
-        }[f]
-        largest = max(largest, float(np.linalg.norm(np.stack(own_f, axis=1) @ S.T, axis=1).max()))
+
+    def value(x, t):
+        space = dict(zip(NAMES, x.T, strict=True)) | {"t": t}
+        return np.stack([eval(text, {"sin": np.sin}, space) for text in f], axis=-1) @ S.T
+
+    moments = np.linspace(0, 7, 60) if f[0].endswith("sin(t)") else (0.0,)
+    largest = max(np.linalg.norm(value(x, t), axis=1).max() for t in moments)
     assert largest <= exact.above <= found.above <= 1.015 * largest
     # and it is attained where the certificate says so, at a point of the tube
     at = np.array(found.at.x)
     assert np.linalg.norm(S @ (at - CENTRE)) <= 0.3 * (1 + 1e-9)
-    moment = {"x1": at[0], "x2": at[1], "x3": at[2], "t": found.at.t or 0.0}
-    value = [eval(text, {"sin": np.sin}, moment) for text in f]
-    assert np.linalg.norm(S @ value) >= found.below * (1 - 1e-9)
+    assert np.linalg.norm(value(at, found.at.t or 0.0)) >= found.below * (1 - 1e-9)
 
 
 def test_half_widths_that_cut_the_ellipsoid_are_searched():

@@ -54,6 +54,5 @@ def test_a_box_without_width_in_all_but_name_is_the_point():
     metric = suprema.metric_bounds()
     thin = (F(1, 10), F(1, 10) + F(1, 10**30)), (F(0), F(0))
     near = KnownStart((F(1, 10), F(0)))
-    assert StartBox(thin).distance(suprema, metric).above == pytest.approx(
-        near.distance(suprema, metric).above, rel=1e-12
-    )
+    exact = near.distance(suprema, metric).above
+    assert StartBox(thin).distance(suprema, metric).above == pytest.approx(exact, rel=1e-12)

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from proven import proven
-from systems import SMALL, TWO, W_TWO, matrix_of, three_state, two_state
+from systems import SMALL, TWO, W_TWO, matrix_of, scaled, three_state, two_state
 
 from tubecert.bounds.constants import Constant
 from tubecert.bounds.start import KnownStart, StartBox, StartWithin
@@ -17,6 +17,7 @@ from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import Beside, residual_constants, uncertainty_constants, wind_constants
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.pencil import Pencil
 from tubecert.trajectory import constant_plan
 
 RHO = 0.3
@@ -28,14 +29,9 @@ M = np.linalg.inv(W)
 def suprema(E, bound="0.1", rate=None, coordinates=None, model=None, *, gap=1e-4):
     """Around the origin, with a wind."""
     model = model or two_state()
-    model = replace(
-        model,
-        E=matrix_of(E, model.states),
-        wind_bound=Fraction(bound),
-        wind_rate=None if rate is None else Fraction(rate),
-    )
-    n = len(model.states)
-    plan = constant_plan([Fraction(0)] * n, [Fraction(0)], Fraction(1))
+    wind = {"wind_bound": Fraction(bound), "wind_rate": None if rate is None else Fraction(rate)}
+    model = replace(model, E=matrix_of(E, model.states), **wind)
+    plan = constant_plan([Fraction(0)] * len(model.states), [Fraction(0)], Fraction(1))
     return Suprema(model, plan, RHO, (Fraction(0), Fraction(1)), Effort(gap=gap), coordinates=coordinates)
 
 
@@ -44,11 +40,8 @@ def beta(of: Suprema) -> Constant:
 
 
 def encloses(found: Constant, value: float) -> bool:
-    return (
-        found.below <= value * (1 + 1e-9)
-        and value <= found.above * (1 + 1e-12)
-        and found.above <= value * (1 + 1e-3)
-    )
+    below = found.below <= value * (1 + 1e-9) and value <= found.above * (1 + 1e-12)
+    return below and found.above <= value * (1 + 1e-3)
 
 
 # -- the constants of E
@@ -88,14 +81,8 @@ def test_the_split_form_of_the_push_is_taken_where_it_is_smaller():
     s = replace(suprema(E, model=model), rho=0.05)
     found = wind_constants(s, beta(s))
     assert found.push.above <= beta(s).above * (1 + 1e-9)
-    over_tube = s.root_of("x", _pencil(s))
+    over_tube = s.root_of("x", Pencil(s.model.BBt, s.model.W))
     assert over_tube.above > beta(s).above * 1.001
-
-
-def _pencil(s):
-    from tubecert.enclosure.pencil import Pencil
-
-    return Pencil(s.model.BBt, s.model.W)
 
 
 @pytest.mark.slow
@@ -127,13 +114,9 @@ def test_in_coordinates_of_the_tube_the_push_is_the_same_and_the_size_is_theirs(
 
 
 def test_more_of_the_metric_is_less_push():
-    s = suprema([["0.3"], ["2"]])
-    scaled = replace(
-        s, model=replace(s.model, W=matrix_of([[f"4*({e})" for e in row] for row in W_TWO], TWO))
-    )
-    assert wind_constants(scaled, beta(scaled)).push.above == pytest.approx(
-        wind_constants(s, beta(s)).push.above / 2, rel=1e-6
-    )
+    s, t = (suprema([["0.3"], ["2"]], model=two_state(W)) for W in (W_TWO, scaled(W_TWO, "4")))
+    one, other = (wind_constants(each, beta(each)).push.above for each in (s, t))
+    assert other == pytest.approx(one / 2, rel=1e-6)
 
 
 # -- what joins the uncertainty
@@ -227,11 +210,8 @@ def test_what_inputs_reach_of_a_parameter_joins_h_and_the_rest_pushes():
     h = -2 * np.sin(2 * t) - 0.1 * np.hypot(x1, x2) - 2 / 4.25 * (-3 * (m - 1) * x1)
     most = np.abs(h[inside]).max()
     assert most <= found["h"].above <= most * 1.01
-    assert own_slope(s) < found["h_x"].above <= own_slope(s) + slope + 1e-6
-
-
-def own_slope(s):
-    return s.uncertainty()[1].above
+    own = s.uncertainty()[1].above
+    assert own < found["h_x"].above <= own + slope + 1e-6
 
 
 def test_a_parameter_along_the_input_leaves_nothing():
