@@ -175,12 +175,8 @@ def three():
     width = spec.tube.epsilon + spec.tube.rho_a
     radius = least_radius(suprema, spec.safe_set, KnownStart(spec.x0).offset(suprema), width, None)
     suprema = suprema.with_radius(radius.rho)
-    return (
-        suprema,
-        bound_constants(suprema, KnownStart(spec.x0), (radius.lower, radius.upper), {}),
-        radius,
-        spec,
-    )
+    constants = bound_constants(suprema, KnownStart(spec.x0), (radius.lower, radius.upper), {})
+    return suprema, constants, radius, spec
 
 
 @pytest.fixture(scope="module")

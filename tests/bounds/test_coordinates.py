@@ -20,7 +20,7 @@ from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
-from tubecert.expression import parse, symbol
+from tubecert.expression import ZERO, parse, symbol
 from tubecert.model import ControlAffineModel
 from tubecert.search.coordinates import Wish, propose
 from tubecert.trajectory import Plan, constant_plan
@@ -169,10 +169,7 @@ def test_the_domain_is_sharp_in_every_direction():
     at_rest = constant_plan([Fraction(0)] * 3, [Fraction(0)], None)
     for c in ([1, 0, 0], [0, 0, 1], [1, -2, 0], [0, 1, 3], [1, 1, -1]):
         tube = Tube(at_rest, Ellipsoid(SKEWED, 0.5, (9.0,) * 3), states=NAMES, inputs=("u",), time=None)
-        e = sum(
-            (weight * symbol(name) for weight, name in zip(c, NAMES, strict=True)),
-            start=parse("0", symbols={}).expression,
-        )
+        e = sum((weight * symbol(name) for weight, name in zip(c, NAMES, strict=True)), start=ZERO)
         found = supremum(scalar(e), tube, Effort(gap=1e-3))
         exact = 0.5 * np.linalg.norm(np.linalg.inv(np.array(SKEWED.rows, dtype=float)).T @ c)
         assert found.below <= exact * (1 + 1e-12)
@@ -478,11 +475,7 @@ def test_what_is_affine_needs_no_search_along_a_plan_either():
     names = {name: symbol(name) for name in (*NAMES, "t")}
     x = tuple(parse(text, symbols=names).expression for text in ("0.5*t", "sin(2*t)", "0.2 - t**2"))
     plan = Plan(x, (t, 1 - t), Fraction(1))
-    own = model(
-        f=["x2", "2*x1 + x3 - 3*sin(x1)", "0.5*x2 - x3 + x1**2"],
-        B=[["0", "0"], ["1", "0"], ["0", "2"]],
-        W=CONSTANT_W,
-    )
+    own = model(f=LINKS, B=[["0", "0"], ["1", "0"], ["0", "2"]], W=CONSTANT_W)
     start = Suprema(own, plan, 0.0, None, Effort(gap=0.05, budget=200_000), coordinates=SKEWED)
     start = start.with_radius(Fraction(3, 10), (Fraction(9),) * 3)
     found = start.drift_on_plan()

@@ -67,11 +67,8 @@ def test_a_plan_at_rest_is_exact():
     found = suprema("{kind: equilibrium, at: [0, 0], input: [0.3, pi/4]}")
     for index, value in ((0, Fraction("0.3")), (1, Fraction(math.pi) / 4)):
         for own in found.input_range(index, SHARP):
-            assert (
-                Fraction(own.below) - Fraction(1, 10**14)
-                <= value
-                <= Fraction(own.above) + Fraction(1, 10**14)
-            )
+            slack = Fraction(1, 10**14)
+            assert Fraction(own.below) - slack <= value <= Fraction(own.above) + slack
             assert own.above - own.below <= 1e-15
     least, _ = found.input_range(0, SHARP)
     assert Fraction(least.below) <= Fraction("0.3") <= Fraction(least.above)

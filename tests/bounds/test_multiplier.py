@@ -18,11 +18,8 @@ from tubecert.trajectory import Plan
 
 NAMES = ("x", "y", "z")
 RHO = Fraction(1, 2)
-S = (
-    (Fraction(2), Fraction(0), Fraction(0)),
-    (Fraction(1, 2), Fraction(1), Fraction(0)),
-    (Fraction(0), Fraction(0), Fraction(3, 2)),
-)
+ROWS = (("2", "0", "0"), ("1/2", "1", "0"), ("0", "0", "3/2"))
+S = tuple(tuple(map(Fraction, row)) for row in ROWS)
 RIDGE = ["sin(2*x)/10", "sin(2*y)/10", "sin(2*z)/10"]
 VECTORS = {"ridge": RIDGE, "bent": ["sin(2*x) + y", "y*z - x"], "one state": ["sin(x) + 0.1"]}
 

@@ -524,11 +524,9 @@ def test_a_cache_that_cannot_be_written_is_no_trouble(monkeypatch, tmp_path):
 
 def test_a_plan_file_that_changes_is_noticed(folder):
     Path("plan.csv").write_text("t,x1,x2,x3,u\n0,0,0,0,0\n20,0,0,0,0\n")
-    plan = (
-        "trajectory: {kind: equilibrium, at: [0, 0, 0], input: [0]}",
-        "trajectory: {kind: csv, file: plan.csv}",
+    path = spec(
+        "spec.yaml", ("{kind: equilibrium, at: [0, 0, 0], input: [0]}", "{kind: csv, file: plan.csv}")
     )
-    path = spec("spec.yaml", plan)
     assert run(path).exit_code == 0
     Path("plan.csv").write_text("t,x1,x2,x3,u\n0,0,0,0,0\n20,7,0,0,0\n")
     assert "TC403" in codes(run(path, "--json"))

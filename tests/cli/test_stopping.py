@@ -47,10 +47,7 @@ STEPS = {
     "certification": ("certify", "import tubecert.pipeline as place; place.certify = {how}"),
     "check": ("check --certify --no-cache", "import tubecert.pipeline as place; place.certify = {how}"),
     "recheck": ("recheck", "import tubecert.recheck.run as place; place.of_every = {how}"),
-    "sweep": (
-        "sweep --over tube.epsilon=1,2",
-        "import tubecert.sweep.run as place; place.certify_point = {how}",
-    ),
+    "sweep": ("sweep --over tube.epsilon=1,2", "from tubecert.sweep import run; run.certify_point = {how}"),
 }
 
 

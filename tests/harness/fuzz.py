@@ -191,11 +191,8 @@ def grammar(rng: random.Random) -> str:
     W = [["0"] * n for _ in range(n)]
     for i in range(n):
         for j in range(i + 1):
-            W[i][j] = W[j][i] = (
-                (e(states[: max(1, n - m)], 2) if rng.random() < 0.2 else number(rng))
-                if i != j
-                else positive(rng)
-            )
+            beside = e(states[: max(1, n - m)], 2) if rng.random() < 0.2 else number(rng)
+            W[i][j] = W[j][i] = positive(rng) if i == j else beside
     data: dict[str, Any] = {
         "tubecert": 1,
         "name": f"case{rng.randrange(1000)}",
@@ -213,10 +210,8 @@ def grammar(rng: random.Random) -> str:
     if rng.random() < 0.3:
         data["adaptation"] = {"A_m": rng.choice(["auto", "-1", number(rng)])}
     if rng.random() < 0.2:
-        data["expect"] = {
-            "verdict": rng.choice(["certified", "refuted", "undecided"]),
-            "rho": ["0", positive(rng)],
-        }
+        verdict = rng.choice(["certified", "refuted", "undecided"])
+        data["expect"] = {"verdict": verdict, "rho": ["0", positive(rng)]}
     if rng.random() < 0.2:
         data["limits"] = {inputs[0]: [number(rng), number(rng)]}
     if n >= 2 and rng.random() < 0.2:
@@ -247,11 +242,8 @@ def _trajectory(rng: random.Random, e: Callable[..., str], n: int, m: int) -> di
             goal = rng.choice(["true", "false"])
             return {"kind": "ilqr", "target": target, "knots": knots, "horizon": positive(rng), "goal": goal}
         case _:
-            return {
-                "kind": "equilibrium",
-                "at": [rng.choice(["0", number(rng)]) for _ in range(n)],
-                **horizon,
-            }
+            at = [rng.choice(["0", number(rng)]) for _ in range(n)]
+            return {"kind": "equilibrium", "at": at, **horizon}
 
 
 # what is asked of each case

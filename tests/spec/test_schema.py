@@ -101,12 +101,8 @@ def test_what_the_reader_says_of_keys_and_kinds_the_schema_says_too(path):
     codes = set(re.findall(r"# expect: (TC\d+)", path.read_text("utf-8", "replace")))
     # keys that are names; YAML that a schema never sees
     by_name = {"units_unknown", "tube_state", "start_box_unknown", "bounds_of_one_input", "bounds_mixed"}
-    by_name |= {
-        "mistake_unit_of_another_case",
-        "hardware_noise_of_nothing",
-        "disturbance_ragged",
-        "disturbance_rows",
-    }
+    by_name |= {"mistake_unit_of_another_case", "hardware_noise_of_nothing"}
+    by_name |= {"disturbance_ragged", "disturbance_rows"}
     exempt = {*by_name, "yaml_complex_key"}
     if codes and codes <= STRUCTURAL | {"TC113"} and path.stem not in exempt:
         assert errors("spec", as_text(path))
@@ -150,9 +146,7 @@ def subschema(path: str, kind: str) -> dict[str, Any]:
             schema = SCHEMAS["spec"]["$defs"][schema["$ref"].rsplit("/", 1)[1]]
         schema = schema.get("items", schema)
         named = schema.get("properties", {})
-        schema = (
-            named[key] if key in named else schema["additionalProperties"]
-        )  # tables have names of their own
+        schema = named.get(key) or schema["additionalProperties"]  # tables have names of their own
         choices = [item for item in schema.get("anyOf", ()) if "properties" in item]
         schema = choices[0] if choices and "properties" not in schema else schema
     while "$ref" in schema:
@@ -205,12 +199,8 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
     metric.write_text(json.dumps({"format": "tubecert-metric/1", "rate": 1, "dual_metric": [[1]]}))
     with_metric(full, str(metric))
     load_system(str(GOOD[0]))
-    unmet = {
-        site
-        for site in sites()
-        if not any(n == site[0] and site[1] <= line <= site[2] for n, line in asked.lines)
-    }
-    assert not unmet, "a section that no example file of tests/specs/ok has"
+    met = [{(name, each) for each in range(first, last + 1)} & asked.lines for name, first, last in sites()]
+    assert all(met), "a section that no example file of tests/specs/ok has"
     # their keys are states or inputs
     box = {"tube.half_widths", "trajectory.x", "trajectory.u", "limits", "hardware.noise", "hardware.limits"}
     for (path, kind), known in asked.known.items():
@@ -304,11 +294,8 @@ def test_certificates_fit_and_have_no_key_that_the_schema_does_not_know(name):
     text = source if isinstance(source, str) else source.read_text("utf-8")
     assert old in text
     result = proven.result(text.replace(old, new) if old else text, **options).to_json()
-    sealed = json.loads(
-        certificate.dump(
-            certificate.seal(result, {"command": "", "started": "", "seconds": 1.0, "versions": {}})
-        )
-    )
+    run = {"command": "", "started": "", "seconds": 1.0, "versions": {}}
+    sealed = json.loads(certificate.dump(certificate.seal(result, run)))
     assert not [f"{error.json_path}: {error.message}" for error in CLOSED.iter_errors(sealed)]
     assert not errors("spec", sealed["result"]["spec"]["effective"])
     again = Certificate.from_json(sealed).to_json()

@@ -216,10 +216,8 @@ STYLES = {
 @pytest.mark.parametrize("style", STYLES)
 def test_a_finding_points_into_any_kind_of_text(style: str) -> None:
     head = "tubecert: 1\nname: minimal\nsystem:\n  f:\n  - "
-    text = (
-        f"{head}{STYLES[style]}\n  states: [x]\n  inputs: [u]\n  B: [[1]]\n"
-        + MINIMAL[MINIMAL.index("safe_set") :]
-    )
+    rest = MINIMAL[MINIMAL.index("safe_set") :]
+    text = f"{head}{STYLES[style]}\n  states: [x]\n  inputs: [u]\n  B: [[1]]\n{rest}"
     (finding,) = findings(text)
     index = text.index("zz")
     line = text.count("\n", 0, index) + 1
@@ -236,11 +234,8 @@ def test_an_escaped_text_is_located_at_its_start() -> None:
 
 def test_equal_systems_have_equal_canonical_forms() -> None:
     """Spacing, quotes, order of operands and spelling of numbers do not count."""
-    other = (
-        minimal("f: [-x]", 'f: [" x * -1.0 "]')
-        .replace("[-1, 1]", "['-1.00', 10/10]")
-        .replace("h: [0]", 'h: ["0*t"]')
-    )
+    other = minimal("f: [-x]", 'f: [" x * -1.0 "]').replace("h: [0]", 'h: ["0*t"]')
+    other = other.replace("[-1, 1]", "['-1.00', 10/10]")
     assert canonical(load_text(other)) == canonical(load_text(MINIMAL))
     changed = minimal("f: [-x]", "f: [-1.0000001*x]")
     assert canonical(load_text(changed)) != canonical(load_text(MINIMAL))
@@ -448,11 +443,8 @@ adaptation: {{A_m: -3}}
 @pytest.mark.parametrize("old", ["states: [x]", "inputs: [u]", "inputs: [u],"])
 def test_a_name_hides_no_other_meaning(old: str, word: str) -> None:
     """States, inputs, parameters: pi would be the constant, True a number, sin a function, t the time."""
-    new = (
-        f"inputs: [u], parameters: {{'{word}': 2}},"
-        if old.endswith(",")
-        else f"{old.split('[', maxsplit=1)[0]}['{word}']"
-    )
+    key = old.split("[", maxsplit=1)[0]
+    new = f"inputs: [u], parameters: {{'{word}': 2}}," if old.endswith(",") else f"{key}['{word}']"
     found = findings(minimal(old, new))
     assert [f for f in found if f.code == "TC111" and place(f)[:2] == "3:"], found
 
