@@ -27,12 +27,8 @@ def quiet():
 
 
 def test_a_hull_reaches_to_either_side():
-    for a, b in (
-        ((1.0, 2.0), (0.0, 3.0)),
-        ((0.0, 3.0), (1.0, 2.0)),
-        ((0.0, 1.0), (2.0, 3.0)),
-        ((2.0, 3.0), (0.0, 1.0)),
-    ):
+    ends = (((1.0, 2.0), (0.0, 3.0)), ((0.0, 1.0), (2.0, 3.0)))
+    for a, b in (*ends, *(pair[::-1] for pair in ends)):
         found = Interval(*a).hull(Interval(*b))
         assert (found.lo, found.hi) == (min(a[0], b[0]), max(a[1], b[1]))
 

@@ -50,11 +50,8 @@ def imported(tree: ast.AST) -> set[str]:
 
 def only_for_types(tree: ast.Module) -> set[ast.AST]:
     """Nodes below `if TYPE_CHECKING:`."""
-    blocks = [
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
-    ]
+    choices = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
+    blocks = [node for node in choices if ast.unparse(node.test) == "TYPE_CHECKING"]
     return {inner for block in blocks for inner in ast.walk(block)}
 
 

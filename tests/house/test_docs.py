@@ -138,19 +138,13 @@ def test_theorem_b_can_be_checked_from_the_file_alone():
     assert c["h"] <= R_H
     assert s1 / omega <= S
     assert Deta / proof["adaptation_rate"] ** 0.5 <= e
-    assert (
-        c["drift_on_plan"]
-        + c["B"] * (c["feedback_gain"] * dbar + min(c["h"] + R_H, max(c["h_initial"], S) + e))
-        < Y
-    )
+    control = c["feedback_gain"] * dbar + min(c["h"] + R_H, max(c["h_initial"], S) + e)
+    assert c["drift_on_plan"] + c["B"] * control < Y
     t = np.linspace(0, 20, 200_001)
     K = (np.exp(-rate * t) - np.exp(-omega * t)) / (omega - rate)
     A1 = (c["metric_input_gain"] * (S + e) + c["plan_defect_metric"]) / rate
-    D = (
-        A1
-        + (c["initial_distance"] - A1) * np.exp(-rate * t)
-        + c["metric_input_gain"] * (c["h_initial"] - S) * K
-    )
+    D = A1 + (c["initial_distance"] - A1) * np.exp(-rate * t)
+    D += c["metric_input_gain"] * (c["h_initial"] - S) * K
     assert D.max() < dbar
     below = result["distance"]["least_adaptation"]["margin"][0]
     assert 1 - D.max() / dbar == pytest.approx(below, abs=1e-6)

@@ -32,11 +32,8 @@ def shortfalls():
     for path in sorted((PACKAGE / "conditions").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "Shortfall":
-                yield from (
-                    part.value.value
-                    for part in node.keywords
-                    if part.arg == "claim" and isinstance(part.value, ast.Constant)
-                )
+                claims = [part.value for part in node.keywords if part.arg == "claim"]
+                yield from (claim.value for claim in claims if isinstance(claim, ast.Constant))
 
 
 def test_what_a_condition_says_that_is_not_proven_is_written():

@@ -63,13 +63,8 @@ def test_the_wheel_is_the_package_and_nothing_else(unpacked):
 def test_the_wheel_runs_without_the_checkout(unpacked, tmp_path):
     """README's first command, and what reads the data of the package: pages, schemas, templates."""
     shutil.copy(ROOT / "configs" / "two_state_orbit.yaml", tmp_path)
-    lines = [
-        "certify two_state_orbit.yaml",
-        "report two_state_orbit.certificate.json",
-        "init robot.yaml",
-        "schema",
-        "explain TC603",
-    ]
+    lines = ["certify two_state_orbit.yaml", "report two_state_orbit.certificate.json"]
+    lines += ["init robot.yaml", "schema", "explain TC603"]
     environment = os.environ | {"PYTHONPATH": str(unpacked)}
     for line in lines:
         command = [sys.executable, "-m", "tubecert", *line.split()]
@@ -146,10 +141,8 @@ def test_the_paper_cites_what_is_listed():
 
 
 def test_the_paper_counts_what_was_verified():
-    verdicts = [
-        found["verdict"]
-        for found in json.loads((ROOT / "configs/published/verified.json").read_text("utf-8"))
-    ]
+    listed = json.loads((ROOT / "configs/published/verified.json").read_text("utf-8"))
+    verdicts = [found["verdict"] for found in listed]
     held, refuted = verdicts.count("certified"), verdicts.count("refuted")
     assert f"holds {held + refuted} contraction metrics" in PAPER
     assert f"proves that {held} of them" in re.sub(r"\s+", " ", PAPER)

@@ -10,35 +10,12 @@ import tubecert
 PACKAGE = Path(tubecert.__file__).parent
 
 # What a certificate rests on. Everything else proposes, composes, shows or falsifies.
+# (what workers prove is believed: they run the same program, docs/guarantee.md)
 TRUSTED_ROOMS = {
-    "errors",
-    "findings",
-    "claims",
-    "records",
-    "digits",
-    "verdict",
-    "letters",
-    "progress",
-    "printable",
-    "files",
-    "leash",
-    "executor",  # what workers prove is believed: they run the same program (docs/guarantee.md)
-    "expression",
-    "spec",
-    "enclosure",
-    "model",
-    "coordinates",
-    "metric",
-    "trajectory",
-    "tube",
-    "bounds",
-    "conditions",
-    "kernel",
-    "kinds",
-    "certificate",
-    "stages",
-    "recheck",
-}
+    "errors", "findings", "claims", "records", "digits", "verdict", "letters", "progress", "printable",
+    "files", "leash", "executor", "expression", "spec", "enclosure", "model", "coordinates", "metric",
+    "trajectory", "tube", "bounds", "conditions", "kernel", "kinds", "certificate", "stages", "recheck",
+}  # fmt: skip
 SAYS_CERTIFIED = "kernel.py"  # the one module in which gains become certified
 ALSO_SAY = {  # of one claim each, no gains
     "bounds/clearance.py": "the tube keeps away from an obstacle",
