@@ -35,10 +35,6 @@ def balls(m):
     return arb_mat([[arb(float(x)) for x in row] for row in m])
 
 
-def eigenvalues(s):
-    return eigenvalues_midrad(*midrad(s))
-
-
 def covers(exact, mid, rad):
     places = np.ndindex(mid.shape)
     return all(abs(exact[i, j] - arb(float(mid[i, j]))) <= arb(float(rad[i, j])) for i, j in places)
