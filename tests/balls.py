@@ -1,7 +1,5 @@
 """A second evaluator: texts of the grammar in ball arithmetic, read without the package's parser or graph."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import nullcontext

@@ -1,7 +1,5 @@
 """A small certificate by hand, in the form of the contract, for tests of what is made of certificates."""
 
-from __future__ import annotations
-
 import copy
 
 _EFFECTIVE = {

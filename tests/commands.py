@@ -1,7 +1,5 @@
 """A command of the program, in the process of the test."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from click.testing import Result

@@ -187,18 +187,12 @@ def claims(problem: TubeProblem, recipe: Any) -> Claims:
         return Claims(du * own.supremum(), R_H, own.ultimate / mpmath.sqrt(n.c["lower"]))
 
 
-# -- theorem 0
-
-
 def alone(n: Given) -> Course:
     """|h| <= Dh acts as it is: the filter has not begun, (4.0)."""
     nothing, Dh = mpf(0), n.c["h"]
     return Course(
         n.c["initial_distance"], n.c["metric_input_gain"], Dh, Dh, nothing, n.delta, n.lam, n.lam, n.T
     )
-
-
-# -- theorem A
 
 
 def kernel(c: mpf, w: mpf, s0: mpf, s1: mpf) -> mpf:
@@ -245,9 +239,6 @@ def rates(n: Given, recipe: RateRecipe) -> dict[str, mpf]:
         return {"26a": first, "26b": rest / a, "26c": _NEVER}
     third = 1 - found["theta"] / (n.rho_a * rest) / mpmath.sqrt(number(recipe.adaptation_rate))
     return {"26a": first, "26b": rest / a, "26c": third}
-
-
-# -- theorem B
 
 
 def needed(n: Given, recipe: Any, Y: mpf) -> tuple[mpf, mpf]:

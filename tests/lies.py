@@ -1,7 +1,5 @@
 """Problems for certificates 0, A and B, what honest searches say of them, and lies about each of their numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from fractions import Fraction

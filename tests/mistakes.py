@@ -4,8 +4,6 @@ The table was read by somebody who did not know the messages: each is located, s
 write instead, or cannot be mistaken. A new mistake is a line here.
 """
 
-from __future__ import annotations
-
 GOOD = """\
 tubecert: 1
 name: cart

@@ -4,8 +4,6 @@ How far an interior-point method comes depends on the last digits of its data, s
 before a tolerance, it is asked again for less.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from typing import Any

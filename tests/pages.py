@@ -1,7 +1,5 @@
 """Pages as a reader sees them: parsed strictly, in text and in a browser."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Constants of the reference systems for tests of conditions and search: sampled or stated, never proven."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

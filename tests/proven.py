@@ -3,8 +3,6 @@
 Not for tests that put something broken in the producer's place: what it makes would be kept for all others.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext

@@ -1,7 +1,5 @@
 """Certificates for the tests of the checker: made once, changed, sealed again, examined."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import pickle

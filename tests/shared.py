@@ -1,7 +1,5 @@
 """What tests make once in a run: kept in its folder, so that every process of the run reads what one has made."""
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import os

@@ -1,7 +1,5 @@
 """Certifications of shipped systems for tests of simulation, each made once."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path

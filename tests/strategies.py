@@ -1,7 +1,5 @@
 """Random expressions as texts of the grammar."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from functools import cache

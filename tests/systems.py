@@ -1,7 +1,5 @@
 """The two systems of the tests, as models and as independent formulas that run on floats, Fractions and balls."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
@@ -110,9 +108,6 @@ def moving() -> Plan:
     """A plan of the two-state system that goes around for 5 s (it does not satisfy the dynamics)."""
     t = symbol("t")
     return Plan((2 * cos(t), -2 * sin(t) + constant(Fraction(1, 2)) * cos(2 * t)), (3 * sin(t),), Fraction(5))
-
-
-# -- independent formulas: `q` turns a decimal text into the number type ------------------------------------------
 
 
 def three_forms(x: Sequence[Any], q: Any) -> dict[str, Any]:

@@ -4,8 +4,6 @@ A change that still rechecks must be of a kind in `HARMLESS`: the field makes no
 examined and true, and weaker (the safe direction is checked here, without the code under test).
 """
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle

@@ -37,9 +37,6 @@ X0_TWO = (Fraction("2.1"), Fraction("0.4"))
 EFFORT = Effort()
 
 
-# -- sampling ------------------------------------------------------------------------------------------------
-
-
 def largest(value, propose, rounds=14, count=4000, seed=0):
     """The largest sampled value: random points, then random points ever closer to the best ones.
 
@@ -369,9 +366,6 @@ def test_the_feedback_gain_of_as_many_moving_inputs_as_states_needs_no_null_spac
     assert found.below <= 4 / 2.5 <= found.above <= 1.02 * 4 / 2.5
 
 
-# -- the radius ----------------------------------------------------------------------------------------------
-
-
 def test_the_radius_is_a_proven_fixed_point_and_nearly_the_least(three):
     suprema, _, radius, spec = three
     a, A = suprema.metric_bounds()
@@ -436,9 +430,6 @@ def test_permuted_states_have_the_same_constants(three):
         changed = getattr(found, name)
         assert changed.below <= constant.above * (1 + 1e-12)
         assert constant.below <= changed.above * (1 + 1e-12)
-
-
-# -- an independent proof ------------------------------------------------------------------------------------
 
 
 def prove(box, settled, budget):
@@ -580,9 +571,6 @@ def test_a_start_a_rounding_away_from_the_plan_has_a_distance(away):
     exact = 1e-16 if away == "rounded" else float(away)  # |sqrt(2) - its float|, to 3 %; M is about 1/4
     assert 0 <= found.below <= exact
     assert 0.4 * exact <= found.above <= exact + 1e-15
-
-
-# -- periods -------------------------------------------------------------------------------------------------
 
 
 def test_periods():

@@ -1,7 +1,5 @@
 """The tube in coordinates of its own: domain, half-widths and constants, against sampling and exact algebra."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 
@@ -75,9 +73,6 @@ def points(coordinates: Coordinates, rho: float, sides: np.ndarray, count: int, 
     return y / np.maximum(over, 1.0)
 
 
-# -- exact algebra
-
-
 @pytest.mark.slow
 @given(st.lists(fractions(-3, 3, 7), min_size=9, max_size=9))
 def test_the_inverse_is_exact(values):
@@ -120,9 +115,6 @@ def test_derivatives_are_by_the_components_of_z():
             difference = (value(of_x, CENTRE + move) - value(of_x, CENTRE - move)) / (2 * step)
             assert slope == pytest.approx(difference, abs=1e-7)
     assert value(fields.B_pinv, CENTRE) == pytest.approx(np.linalg.pinv(value(fields.B, CENTRE)))
-
-
-# -- the domain
 
 
 @settings(deadline=None, max_examples=40)
@@ -202,9 +194,6 @@ def test_a_moving_plan_carries_the_ellipsoid():
     exact = 1 + np.sin(1) + own
     assert found.below <= exact * (1 + 1e-12)
     assert exact <= found.above <= exact * 1.002
-
-
-# -- half-widths
 
 
 def test_half_widths_of_a_constant_metric_are_exact():
@@ -313,9 +302,6 @@ def test_the_least_level_holds_the_start_and_the_radii():
     assert reach.above <= 0.1 * stretch * 1.02
 
 
-# -- constants in z
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "coordinates", [SKEWED, Coordinates(rows(np.diag([1, 2, 5]).tolist()))], ids=["skewed", "diagonal"]
@@ -421,9 +407,6 @@ def test_the_identity_by_the_new_path_is_the_old_path():
     for name in old:  # both enclose the same number
         assert max(old[name].below, found[name].below) <= min(old[name].above, found[name].above), name
         assert found[name].above == pytest.approx(old[name].above, rel=0.011, abs=1e-12), name
-
-
-# -- vectors that are affine in some states
 
 
 LINKS = ("x2", "2*x1 + x3 - 3*sin(x1)", "0.5*x2 - x3 + x1**2")

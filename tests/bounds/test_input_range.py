@@ -1,7 +1,5 @@
 """What u* does on a plan: closed forms, sampled plans of every kind, and the place where it is largest."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

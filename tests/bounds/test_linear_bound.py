@@ -3,8 +3,6 @@
 Compared with points of the tube; whatever is proposed for the linear part, the bound stays a bound.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache

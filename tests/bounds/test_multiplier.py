@@ -1,7 +1,5 @@
 """Norms of vectors by a multiplier for the constraint of the tube (theory 1a.8), compared with points of the tube."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

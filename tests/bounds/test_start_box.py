@@ -1,7 +1,5 @@
 """A box of starts: d0, H0 and the offset are those of the worst start in it, or more."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -191,9 +191,6 @@ def test_a_smaller_tube_has_smaller_suprema():
         assert inner.above <= outer.above * 1.01
 
 
-# -- plans ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", TEXTS)
 @given(start=times, width=st.sampled_from([0.0, 1e-9, 0.01, 0.5]), part=fractions(0, 1, 9))
 @settings(max_examples=25, deadline=None)
@@ -224,9 +221,6 @@ def test_the_defect_of_a_plan_is_exact():
 def test_a_moving_plan_needs_a_horizon():
     with pytest.raises(ValueError, match="horizon"):
         _ = Plan((t,), (), None).time
-
-
-# -- assumption 1 --------------------------------------------------------------------------------------------
 
 
 def judge(name, rho, *sides):
@@ -289,9 +283,6 @@ def test_a_ball_projected_to_what_does_not_move_needs_no_time():
     found = supremum(scalar(symbol("z") ** 2), tube, Effort())
     assert found.above == pytest.approx((1 / 7 + 0.5) ** 2, rel=1e-3)
     assert found.below <= (1 / 7 + 0.5) ** 2 <= found.above
-
-
-# -- what makes it false is noticed --------------------------------------------------------------------------
 
 
 def test_a_cut_of_one_per_cent_too_much_is_noticed(monkeypatch):

@@ -1,7 +1,5 @@
 """The tube around the planned two-state curve: every constant against dense sampling, from knots of the certificate."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import simulated

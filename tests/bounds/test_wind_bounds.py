@@ -1,7 +1,5 @@
 """What a wind does, over a tube: closed forms, coordinates, what joins the uncertainty, what the certificate says."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from fractions import Fraction
@@ -42,9 +40,6 @@ def beta(of: Suprema) -> Constant:
 def encloses(found: Constant, value: float) -> bool:
     below = found.below <= value * (1 + 1e-9) and value <= found.above * (1 + 1e-12)
     return below and found.above <= value * (1 + 1e-3)
-
-
-# -- the constants of E
 
 
 def test_a_constant_field_under_a_constant_metric():
@@ -119,9 +114,6 @@ def test_more_of_the_metric_is_less_push():
     assert other == pytest.approx(one / 2, rel=1e-6)
 
 
-# -- what joins the uncertainty
-
-
 @pytest.mark.slow
 def test_a_slow_wind_that_an_input_can_make_is_uncertainty():
     """h + 2 w along the input: every constant in closed form."""
@@ -174,9 +166,6 @@ def test_what_vanishes_is_seen_to_vanish():
     model = three_state(B=[["sin(x1)"], ["cos(x1)"], ["1 + x2"]])
     s = suprema([["2*x3*sin(x1)"], ["2*x3*cos(x1)"], ["2*x3*(1 + x2)"]], rate="1", model=model)
     assert wind_constants(s, Constant.exactly(1.0)).size == Constant.exactly(0.0)
-
-
-# -- unknown parameters
 
 
 def unknown(drift, ranges, h=None, coordinates=None, rho=RHO, *, gap=1e-4):
@@ -255,9 +244,6 @@ def test_in_coordinates_the_residual_is_what_is_sampled():
     sizes = np.linalg.norm(left, axis=1).max()
     assert pushes <= rest.push.above <= pushes * 1.01
     assert sizes <= rest.size.above <= sizes * 1.01
-
-
-# -- certificates
 
 
 def certified(extra, **options):

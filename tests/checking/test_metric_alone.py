@@ -1,7 +1,5 @@
 """Specifications that ask about a metric alone: read, checked, verified, locked; and refused by whoever needs more."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

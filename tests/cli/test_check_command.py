@@ -1,7 +1,5 @@
 """`check`: exit codes, expectations, formats, jobs, the cache."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.resources
 import json
@@ -85,9 +83,6 @@ def spec(name: str = "spec.yaml", *changes: tuple[str, str], expect: str = "") -
 
 def codes(result) -> list[str]:
     return [item["code"] for item in json.loads(result.stdout)]
-
-
-# certification and expectations
 
 
 RANGES = "rho: [0.039, 0.04], bandwidth: [18, 19], adaptation_rate: [1e6, 2e6]"
@@ -184,9 +179,6 @@ def test_an_internal_error_is_none_of_the_file(monkeypatch):
     result = run(spec())
     assert result.exit_code == 3
     assert "Traceback" not in result.output
-
-
-# formats
 
 
 def example(path: str = "a b/ä,:%.yaml") -> list[Checked]:
@@ -375,9 +367,6 @@ def test_nothing_to_check_is_said_in_every_format(format_, folder):
     result = run(folder, "--format", format_)
     assert result.exit_code == 2
     assert "no specification in" in result.stdout
-
-
-# the cache
 
 
 def entries() -> list[Path]:

@@ -46,9 +46,6 @@ def quiet_failure(result, code):
     assert result.stdout == ""
 
 
-# help and version
-
-
 def test_alone_it_prints_help():
     alone, asked = run(), run("--help")
     assert alone.exit_code == asked.exit_code == 0
@@ -88,9 +85,6 @@ def test_version_of_what_results_rest_on():
 def test_usage_errors(arguments, folder):
     quiet_failure(run(*arguments), 2)
     assert not list(folder.iterdir())
-
-
-# certify
 
 
 def test_a_certificate_is_written_and_reported(folder, proven):
@@ -186,9 +180,6 @@ def test_all_bad_numbers_at_once():
     assert result.stderr.endswith("4 errors\n")
 
 
-# bad input
-
-
 def replaced(old, new):
     assert old in TEXT
     return TEXT.replace(old, new)
@@ -231,9 +222,6 @@ def test_unreadable_files(folder, tmp_path, command):
         assert result.output.endswith("1 error\n")
         assert "Traceback" not in result.output
     assert not list(folder.iterdir())
-
-
-# metric files
 
 
 METRIC = {
@@ -299,9 +287,6 @@ def test_a_metric_file_is_verified(folder, change, claim):
     assert result.stdout.startswith(f"refuted three_state: {claim}: ")
 
 
-# targets
-
-
 @pytest.fixture
 def unused(monkeypatch):
     """Certification that must not be reached."""
@@ -362,9 +347,6 @@ def test_gains_that_nothing_can_have_are_refused(unused, gain):
         assert "write a number between 1e-60 and 1e60" in result.stderr
 
 
-# the ways to end
-
-
 @pytest.mark.parametrize("error", [ZeroDivisionError("oops"), RecursionError("deep"), AssertionError()])
 def test_internal_errors_leave_a_log_if_they_can_and_show_where_if_asked(
     folder, tmp_path, proven, error, monkeypatch
@@ -394,9 +376,6 @@ def test_errors_bring_their_code(proven):
         assert result.stderr == "error TC203: B loses rank\n1 error\n"
 
 
-# check
-
-
 def test_check_folders(folder):
     (folder / "sub").mkdir()
     (folder / ".hidden").mkdir()
@@ -413,9 +392,6 @@ def test_check_folders(folder):
     [first, *_] = json.loads(run("check", folder, "--json").stdout)
     assert first["code"] == "TC105"
     assert first["file"] == str(folder / "b.yaml")
-
-
-# the real thing
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """`compare`: what certificates state, side by side; what is missing and what differs is said."""
 
-from __future__ import annotations
-
 import copy
 import csv
 import io

@@ -1,7 +1,5 @@
 """schema, init, explain, version, completion, help: what is at hand every day."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -24,9 +22,6 @@ ROOT = PACKAGE.parent
 pytestmark = pytest.mark.usefixtures("folder")
 
 
-# schema
-
-
 @pytest.mark.parametrize("name", Schema)
 def test_schema(name):
     result = run("schema", name)
@@ -38,9 +33,6 @@ def test_schema(name):
 def test_schema_of_the_specification_by_default():
     assert run("schema").stdout == run("schema", "spec").stdout
     assert run("schema", "other").exit_code == 2
-
-
-# init
 
 
 @pytest.mark.usefixtures("barely")
@@ -101,9 +93,6 @@ def test_init_to_stdout(folder):
     assert result.stdout == (PACKAGE / "templates" / "regulation.yaml").read_text("utf-8")
     assert not list(folder.iterdir())
     assert run("init", "--template", "other").exit_code == 2
-
-
-# explain
 
 
 def codes_of_the_package() -> set[str]:
@@ -194,9 +183,6 @@ def test_examples_are_wrong_and_right_as_they_say(code, old):
         assert (code in run("check", "example.yaml", "--json").stdout) is said
 
 
-# version, help, completion
-
-
 def commands() -> list[str]:
     return [command.name for command in app.registered_commands if command.name] + ["certify"]
 
@@ -216,9 +202,6 @@ def test_completion_is_offered_and_works():
     command = [sys.executable, "-m", "tubecert"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.split() == ["check"], done
-
-
-# what others run
 
 
 def test_the_hooks_run_commands_that_exist():
@@ -245,9 +228,6 @@ def test_the_workflow_that_is_documented_is_one():
     assert run("check", values["paths"], *values["options"].split(), "--help").exit_code == 0
     ci = (ROOT / ".ci" / "run").read_text("utf-8")
     assert '"$bin/tubecert" check --strict --certify' in ci
-
-
-# synth, of a file that is not complete
 
 
 def test_a_metric_at_a_rate_needs_no_uncertainty_and_no_trajectory(folder):

@@ -1,7 +1,5 @@
 """A small run of the fuzzing harness, and that the harness notices what it is for."""
 
-from __future__ import annotations
-
 import contextlib
 import signal
 import subprocess

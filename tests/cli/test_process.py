@@ -1,7 +1,5 @@
 """How a process ends: 1 means refuted and nothing else, and what was half written is gone."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

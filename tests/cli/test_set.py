@@ -1,7 +1,5 @@
 """`--set`: in certificates, in recheck, in simulate; what cannot go together is refused before any work."""
 
-from __future__ import annotations
-
 import copy
 import json
 from pathlib import Path

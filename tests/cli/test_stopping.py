@@ -1,7 +1,5 @@
 """A command ends when it is told to, also in a step that never looks up, and says what it came to by then."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """What is said to a command line, or to a file, that means something else."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

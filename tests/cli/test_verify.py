@@ -47,9 +47,6 @@ def folder(tmp_path):
     return tmp_path
 
 
-# -- verdicts
-
-
 def test_a_metric_without_plan_uncertainty_or_tube(folder):
     """The largest rate is that of the closed form: one direction is left, at the worst x2 of a box."""
     done = run(folder / "own.yaml", "--json")
@@ -139,9 +136,6 @@ def test_what_is_missing_is_said(folder):
     assert run(_json(folder, {"coefficients": W, "rate": 1})).exit_code == 2
     (folder / "own.yaml").write_text(OWN)
     assert run(folder / "own.yaml").exit_code == 2
-
-
-# -- coefficients of other tools
 
 
 def _json(folder, content, name="given.json"):

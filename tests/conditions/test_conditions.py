@@ -1,7 +1,5 @@
 """Margins of certificates 0, A and B: what they need, scales and units that do not matter, decimals."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import fields, replace
 from fractions import Fraction
@@ -41,9 +39,6 @@ def test_a_comparison_that_cannot_be_decided_yields_both_branches():
     value = choose(test, Interval.exact(np.full(4, 5.0)), Interval.exact(np.full(4, 2.0)))
     assert list(value.lo) == [2.0, 5.0, 2.0, 2.0]
     assert list(value.hi) == [5.0, 5.0, 2.0, 5.0]
-
-
-# --- invariance and mutation
 
 
 def scaled(c: float) -> dict[str, float]:
@@ -154,9 +149,6 @@ def test_derived_constants_are_enclosures_by_name():
         assert both[name].below < constant.below <= both[name].above
 
 
-# --- options
-
-
 def test_a_predictor_without_damping_is_refused():
     with pytest.raises(ValueError, match="stable"):
         alive(predictor_gain=Fraction(-1))
@@ -167,9 +159,6 @@ def test_inconsistent_radii_are_misuse():
         alive(rho=Fraction("0.89"))
     with pytest.raises(ValueError, match="positive"):
         alive(epsilon=Fraction(0))
-
-
-# --- decimals
 
 
 def test_rounding_is_exact():

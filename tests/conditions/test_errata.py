@@ -1,7 +1,5 @@
 """The numbers of docs/errata.md: each counterexample to a printed statement, computed here."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

@@ -59,9 +59,6 @@ def test_without_a_feedback_gain_nothing_is_added_and_without_a_bound_of_it_noth
     assert shares_of(section("0", problem(feedback_gain=(1.0, inf)))) is None
 
 
-# -- limits
-
-
 def limited(low=-1.0, high=2.0, limits=("-3", "4"), **changes):
     return replace(
         LimitedInput(

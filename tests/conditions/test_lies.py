@@ -50,9 +50,6 @@ def agrees(problem: TubeProblem, recipe: Any, words: object = "") -> bool:
     return True
 
 
-# -- one number, or two, that lie
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind"), [(name, kind) for name in PROBLEMS for kind in KINDS])
 def test_numbers_that_lie_are_certified_where_they_prove_the_theorem_all_the_same(name, kind):
@@ -63,9 +60,6 @@ def test_numbers_that_lie_are_certified_where_they_prove_the_theorem_all_the_sam
     if kind != "0":
         assert any(found) == (kind in proven)
         assert not all(found)
-
-
-# -- a recipe for something else
 
 
 @pytest.mark.slow
@@ -179,9 +173,6 @@ def test_another_predictor_than_was_asked_for_proves_nothing(kind):
         other = replace(recipe, predictor_gain=g, adaptation_rate=F(10) ** 12)
         assert isinstance(check(free, other), Proof)
         assert not isinstance(check(problem, other), Proof)
-
-
-# -- a proposal that is true in one place and lies in another
 
 
 def lies_beside(kind: str) -> Iterator[Any]:

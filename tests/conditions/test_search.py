@@ -1,7 +1,5 @@
 """Smallest gains against reference rows, dense grids and brute force; gains asked for; what cannot be met."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from fractions import Fraction
@@ -40,9 +38,6 @@ def unmet() -> TubeProblem:
     return two_state(values={"plan_defect_metric": 1000.0})
 
 
-# --- rows of the reference
-
-
 @pytest.mark.slow
 def test_three_state_corrected():
     assert gains(judged_distance(three_state()).least_adaptation) == pytest.approx((10.8, 1.38e4), rel=5e-3)
@@ -69,9 +64,6 @@ def test_two_state_with_a_plan_defect(delta, omega, Gamma):
     result = judged_distance(two_state(values={"plan_defect_metric": delta}))
     assert gains(result.least_adaptation)[0] == pytest.approx(omega, rel=0.03)
     assert gains(result.least_adaptation)[1] == pytest.approx(Gamma, rel=0.01)
-
-
-# --- pinned decimals: a constant smaller by 2 % must show
 
 
 def printed_gains(problem: TubeProblem) -> tuple[Fraction, ...]:
@@ -102,9 +94,6 @@ def test_a_constant_reduced_by_two_per_cent_changes_the_printed_gains(name):
     values = ALIVE | ELSEWHERE.get(name, {})
     base = printed_gains(alive(values=values)) if name in ELSEWHERE else PINNED
     assert printed_gains(alive(values=values | {name: values[name] * 0.98})) != base
-
-
-# --- certificate A against grids
 
 
 def rate_needed_by_brute_force(problem: TubeProblem, grid: np.ndarray) -> np.ndarray:
@@ -180,9 +169,6 @@ def test_auto_takes_the_best_predictor_gain_of_26():
     assert float(result.pair.recipe.predictor_gain) == pytest.approx(g[np.argmax(margins)], rel=0.03)
     assert float(result.pair.margins["26c"].lo) >= margins.max() - 1e-4
     assert gains(judged_26(alive()).pair)[1] * 1.001 > G
-
-
-# --- certificate B against brute force
 
 
 def least_rate_by_scan(problem: TubeProblem, omegas: np.ndarray, g: float | None) -> tuple[float, float]:
@@ -264,9 +250,6 @@ def test_printed_pairs_of_b_are_proven_and_cannot_be_smaller(problem):
     assert result.least_adaptation.ultimate_radius < float(problem.rho)
 
 
-# --- gains asked for
-
-
 @pytest.mark.slow
 def test_gains_asked_for_are_judged_as_given():
     problem = alive()
@@ -320,9 +303,6 @@ def test_one_gain_asked_for_leaves_the_other_to_the_search():
     assert judged_distance(problem, adaptation_rate=Fraction(1)).verdict is Verdict.REFUTED
     assert judged_distance(problem, bandwidth=Fraction("0.01")).verdict is Verdict.REFUTED
     assert judged_distance(problem, bandwidth=Fraction(200)).verdict is Verdict.CERTIFIED
-
-
-# --- what no gains can do
 
 
 def test_an_initial_distance_beyond_the_tube_is_refuted_by_name():
@@ -381,9 +361,6 @@ def test_elasticities_are_the_slopes_of_the_search():
     assert elasticities_26(problem, judged_26(problem).least_adaptation.recipe)["B_pinv"] == pytest.approx(
         2.0, abs=0.2
     )
-
-
-# --- anything in, a verdict out
 
 
 def random_problem(rng: np.random.Generator) -> TubeProblem:

@@ -1,7 +1,5 @@
 """B that depends on the state: constants against closed forms, C3 exact, C2 by both routes."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import cos, sin
 from pathlib import Path

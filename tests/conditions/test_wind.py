@@ -1,7 +1,5 @@
 """Wind and unknown parameters in the formulas of 0 and B (theory 7): limits, closed forms, verdicts."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -39,15 +37,6 @@ def curved(**options) -> TubeProblem:
     """A problem that certifies although B depends on the state."""
     values = {"B_x": 0.05, "B_pinv_x": 0.02} | options.pop("values", {})
     return two_state(values=values, **options)
-
-
-# -- without wind
-
-
-# -- what is added to delta and phi
-
-
-# -- the estimate of B
 
 
 @given(
@@ -91,9 +80,6 @@ def test_the_least_rate_is_one_at_which_e_is_what_it_has_to_be(problem):
     needed = distance.error_needed(n, Y, omega, Predictor.of_gain(omega, omega), Gamma)
     assert np.isfinite(Gamma[0])
     assert needed[0] == pytest.approx(e[0], rel=1e-9)
-
-
-# -- verdicts
 
 
 @pytest.mark.slow

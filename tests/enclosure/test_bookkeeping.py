@@ -1,7 +1,5 @@
 """What a search may forget of its boxes: nothing. Objectives by hand, whose bounds say what they are told to say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

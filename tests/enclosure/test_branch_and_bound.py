@@ -291,9 +291,6 @@ def test_polynomials_against_a_grid():
         assert found.below <= values.max() + 0.1
 
 
-# -- objectives ----------------------------------------------------------------------------------------------
-
-
 IN_X = Fields(SimpleNamespace(states=("x", "y")), None)  # no coordinates of the tube's own
 
 
@@ -391,9 +388,6 @@ def test_boxes_that_stay_below_a_value_that_is_reached_say_no_more(name, monkeyp
     assert own.below == closer.below
     assert own.boxes == closer.boxes
     assert own.above == pytest.approx(closer.above, rel=1e-13)
-
-
-# -- what makes a bound false is noticed ----------------------------------------------------------------------
 
 
 def test_a_bound_reduced_by_two_per_cent_is_noticed(monkeypatch):

@@ -4,8 +4,6 @@ The oracle is a polynomial as a table of rational coefficients, differentiated a
 cubic the second derivatives are affine, so that their exact ranges, and with them the docstring's theorem, are known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -126,9 +124,6 @@ def of_all(one, count):
     return st.lists(one, min_size=count, max_size=count)
 
 
-# -- the theorem of the module, literally
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("dim", [1, 2, 3])
 @given(data=st.data())
@@ -157,9 +152,6 @@ def test_the_enclosure_is_that_of_the_theorem(dim, data):
             rest = r[i] ** 2 * QUARTER * abs(H[i, i][0])
             rest += HALF * sum((r[i] * r[j] * H[i, j][1] for j in range(dim)), Fraction(0))
             assert abs(Fraction(float(e.rest[0][i, 0, 0, 0, 0])) - rest) <= near
-
-
-# -- containment, without any tolerance
 
 
 @pytest.mark.slow
@@ -265,9 +257,6 @@ def support_or_inf(e, sign):
     if not all(np.isfinite(part).all() for part in parts):
         return float("inf")
     return support(e, 0, {(0, 0): Fraction(sign)})
-
-
-# -- tight cases: a smaller factor, another sign or a missing term leaves a true value outside
 
 
 def top(e):

@@ -1,7 +1,5 @@
 """Bounds at the edge of what a rounding, a radius or an underflow moves: drop a term of a proof, and one fails."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from itertools import product as combinations

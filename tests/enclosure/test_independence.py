@@ -1,7 +1,5 @@
 """Independent columns, proven by a left inverse: never where they are dependent, and whatever LAPACK says."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -343,9 +343,6 @@ def test_midpoint_and_radius_cover(drawn):
     assert a.magnitude == max(abs(bounds[0]), abs(bounds[1]))
 
 
-# -- what the proofs rest on -------------------------------------------------------------------------------
-
-
 def sample(name):
     rng = np.random.default_rng(7)
     spread = rng.choice([-1.0, 1.0], 1500) * 10.0 ** rng.uniform(-290, 0, 1500)

@@ -242,9 +242,6 @@ def test_whitening_turns_a_matrix_into_nearly_the_identity_or_gives_up():
         assert np.array_equal(whitening(hopeless[None])[0], np.eye(3))
 
 
-# -- LAPACK is believed nothing ----------------------------------------------------------------------------
-
-
 def lies(honest, rng):
     """Wrong answers of an eigenvalue or singular value routine: tuples of arrays."""
     vectors = [k for k, part in enumerate(honest) if part.ndim == 3]

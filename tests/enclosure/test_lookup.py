@@ -1,7 +1,5 @@
 """Functions of tables in every arithmetic, against scipy's interpolants and exact values at rational points."""
 
-from __future__ import annotations
-
 import pickle
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Bounds that no sampling of a whole certificate would miss: the last rounding, the last vertex, the width of a box."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """A search that falls apart: the same to the bit whoever searches the parts, sound, and nothing lost with a worker."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

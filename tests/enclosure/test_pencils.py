@@ -1,7 +1,5 @@
 """Bounds of pencils where little is to spare: against exact rationals, and whatever LAPACK answers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise

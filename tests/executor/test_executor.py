@@ -1,7 +1,5 @@
 """Executors: order, exceptions, workers that die, interruptions."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

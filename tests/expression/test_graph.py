@@ -1,7 +1,5 @@
 """The expression graph: folding, sharing, derivatives against another algebra, text that parses back."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from fractions import Fraction

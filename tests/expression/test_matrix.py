@@ -1,7 +1,5 @@
 """Matrices of expressions against the definition, exactly."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import permutations
 from math import prod

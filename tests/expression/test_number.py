@@ -1,7 +1,5 @@
 """Numbers with pi and degrees: rounded to the side that their place asks for, never beyond it."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Text that keeps what folding dropped."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import pytest

@@ -1,7 +1,5 @@
 """The parser: what it accepts, what it owes, and what it says about everything else."""
 
-from __future__ import annotations
-
 import keyword
 import string
 from fractions import Fraction

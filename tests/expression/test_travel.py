@@ -1,7 +1,5 @@
 """Expressions that travel: copied, pickled, sent to another process and back, they are the same object."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import subprocess

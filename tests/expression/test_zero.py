@@ -1,7 +1,5 @@
 """The zero test: proofs that hold, and no proof of anything false."""
 
-from __future__ import annotations
-
 import mpmath
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Texts of others are shown as they are, and steer nothing: terminals, workflows, pages, shells."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import json
@@ -53,9 +51,6 @@ def is_clean(text: str) -> bool:
     return all(line.isprintable() for line in lines) and not any(COMMAND.match(line) for line in lines)
 
 
-# the rules themselves
-
-
 @given(FOREIGN)
 def test_a_visible_text_is_one_line_that_prints(text):
     assert visible(text).isprintable()
@@ -90,9 +85,6 @@ def test_a_terminal_gets_no_command(text, color):
     terminal = Terminal.of(StringIO(), color, {})
     shown = terminal.text([Text(f"{text} x", style="bold")])
     assert is_clean(re.sub(r"\x1b\[[0-9;]*m", "", shown))
-
-
-# findings, in every format
 
 
 def checked(text: str) -> list[Checked]:
@@ -142,9 +134,6 @@ def test_the_command_line_is_shown_as_it_prints(arguments, capfd):
         patch.setattr("sys.argv", ["tubecert", *arguments])
         assert commands.start() == 2
     assert is_clean(capfd.readouterr().err)
-
-
-# certificates
 
 
 def planted(text: str, *path: str) -> dict:
@@ -228,9 +217,6 @@ def test_nothing_in_a_certificate_is_markup_of_its_page(text):
     count = [sum(token.type == "heading_open" for token in parser.parse(each)) for each in (plain, page)]
     assert count[0] == count[1]
     assert "html_block" not in {token.type for token in parser.parse(page)}
-
-
-# names that are not UTF-8
 
 
 @pytest.mark.usefixtures("barely")

@@ -1,7 +1,5 @@
 """What a file may do to the tool: pipes, devices, folders, size, and files that are not what they are named for."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource
@@ -125,9 +123,6 @@ def test_a_cache_entry_that_is_a_pipe_counts_as_absent():
     assert kept.read_kept("plans", "a") is None
 
 
-# files that are not what they are named for (S2)
-
-
 SECRETS = {
     "environ": b"HOME=/root\x00TOKEN=hunter2,q=1\x00",
     "passwd": b"root:hunter2:0:0:root,,,:/root:/bin/sh\n",
@@ -172,9 +167,6 @@ def test_a_link_in_a_folder_does_not_lead_out_of_it():
     assert "hunter2" not in done.output
     assert done.exit_code == 0, done.output
     assert "2 specifications checked" in done.output
-
-
-# size of what is reported (S3)
 
 
 @pytest.mark.slow

@@ -10,8 +10,6 @@ or an alarm; a case that kills the process (memory is limited) was the last one 
     python tests/harness/fuzz.py --first 4711 --cases 1 --show   # one case
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -62,9 +60,6 @@ def case(number: int) -> str:
     for _ in range(rng.choice([1, 1, 1, 1, 2, 3, 8])):
         text = rng.choice(MUTATIONS)(rng, text)
     return text
-
-
-# mutations
 
 
 def _lines(change: Callable[[random.Random, list[str]], None]) -> Callable[[random.Random, str], str]:
@@ -138,9 +133,6 @@ MUTATIONS: list[Callable[[random.Random, str], str]] = [
     *(_replace_token, _replace_token, _exchange_tokens, _characters, _cut),
     *[_scale_number] * 5,
 ]
-
-
-# grammar
 
 
 def expression(rng: random.Random, names: list[str], depth: int, functions: list[str]) -> str:
@@ -246,9 +238,6 @@ def _trajectory(rng: random.Random, e: Callable[..., str], n: int, m: int) -> di
             return {"kind": "equilibrium", "at": at, **horizon}
 
 
-# what is asked of each case
-
-
 def _takes_minutes(text: str) -> bool:
     """Whether its metric is synthesised for many states: a solver is no matter of boxes, nor to be interrupted."""
     from tubecert.errors import TubecertError
@@ -345,9 +334,6 @@ class Judge:
         if format_ in ("json", "sarif"):
             json.loads(result.stdout)
         return f"exit {result.exit_code}"
-
-
-# the run
 
 
 class Alarm(BaseException):

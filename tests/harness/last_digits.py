@@ -9,8 +9,6 @@ with 1 + k 2^-52, |k| <= 2, and the vectors of decompositions come out with othe
 same shape, as from one library on one processor.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from functools import cache

@@ -3,8 +3,6 @@
 PYTHONPATH=tests/harness python -m pytest -p reverse_order
 """
 
-from __future__ import annotations
-
 import pytest
 
 

@@ -10,8 +10,6 @@ The kinds of harmless changes are listed in `tests/tampers.py` and in docs/reche
 accepted. Outcomes of claims that a change does not touch are kept, so that a change costs what it touches.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -4,8 +4,6 @@ Counted in the syntax tree, so that comments and docstrings do not matter. `rech
 the rest. The edge, where strings have their place, is listed in `EDGE`. Names that stand for Any count as it does.
 """
 
-from __future__ import annotations
-
 import ast
 from collections import Counter
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ Pages that have a test of their own are named in ELSEWHERE, commands that take m
 NOT_RUN: these are still read by the program's own command line. A block that is in no class fails.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil
@@ -130,9 +128,6 @@ RUN = [page for page, found in BLOCKS.items() if found and page not in ELSEWHERE
 README = "README.md"
 
 
-# what a line says
-
-
 NUMBER = re.compile(r"\d[\d.]*(?:e[-+]?\d+)?")
 
 
@@ -154,9 +149,6 @@ def told(line: str, real: list[str]) -> bool:
         and (free or numbers(line) == pytest.approx(numbers(other), rel=0.01, abs=1e-3))
         for other in real
     )
-
-
-# commands
 
 
 def commands(block: Block) -> list[str]:
@@ -302,9 +294,6 @@ def completed(group: list[tuple[str, str]], base: list[tuple[str, str]]) -> Iter
         else:
             yield keys[key]
     yield from (text for key, text in group if key not in dict(base))
-
-
-# the tests
 
 
 @pytest.mark.slow

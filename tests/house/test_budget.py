@@ -1,7 +1,5 @@
 """How large each room may be. Numbers are lowered when a room shrinks, and never raised; a new room has its own row."""
 
-from __future__ import annotations
-
 import ast
 from collections import Counter
 from operator import gt

@@ -1,7 +1,5 @@
 """The pages in docs/: links resolve, code references exist, every tag of the code is in the equation index."""
 
-from __future__ import annotations
-
 import ast
 import re
 from functools import reduce

@@ -1,7 +1,5 @@
 """docs/howto, followed to the letter, beside the arm of the tutorial: files, commands, what they print."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """docs/library.md, followed to the letter: its code in its order, and what it prints."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

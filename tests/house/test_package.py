@@ -1,7 +1,5 @@
 """What is handed out: the wheel, the sdist, the action and the workflows, and that all of them tell one version."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The site and the notebooks: every page is reached, every link resolves, every notebook runs as it stands."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

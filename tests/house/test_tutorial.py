@@ -1,7 +1,5 @@
 """The tutorial, followed to the letter: its files, its commands in their order, its output."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

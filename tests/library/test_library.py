@@ -68,9 +68,6 @@ def refused(code, function, *arguments, **options):
     return finding
 
 
-# specifications
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
 def test_a_mapping_is_the_same_system_as_its_file(path):
@@ -208,9 +205,6 @@ def test_findings_show_the_entry():
     with pytest.raises(tc.SpecError, match=r"(?s)specification>:.*TC110.*-p - w.*\^") as caught:
         tc.specification(changed(system__f=["v", "-p - w"]))
     assert isinstance(caught.value, tc.TubecertError)
-
-
-# certification
 
 
 def test_a_plan_that_is_no_equilibrium_is_told_before_anything_is_certified():
@@ -365,9 +359,6 @@ def test_a_file_that_is_not_there():
     refused("TC600", tc.read, "nowhere.json")
 
 
-# metrics
-
-
 @pytest.mark.slow
 def test_a_metric_that_was_found_is_proven_again(tmp_path):
     found = tc.synthesise(DATA, rate="0.3")
@@ -399,9 +390,6 @@ def test_wishes_that_mean_nothing_are_refused():
     given_ = {"objective": "best", "degree": 9, "variables": ["w"], "solver": "none", "route": "x"}
     for options in (*({key: value} for key, value in given_.items()), {"objective": "rate", "rate": 1}):
         refused("TC112", tc.synthesise, DATA, **options)
-
-
-# recheck, report, simulate
 
 
 @pytest.mark.slow
@@ -479,9 +467,6 @@ def test_a_simulation_is_refused():
     refused("TC604", tc.simulate, certified(), spec=changed(system__f=["v", "-2*p - v"]))
 
 
-# looks
-
-
 @pytest.mark.slow
 def test_texts_are_escaped_in_notebooks(tmp_path):
     spec, result = tc.load(DATA), certified()
@@ -542,9 +527,6 @@ def test_a_single_state_is_drawn_over_time():
 
     axes = tc.certify(SCALAR).plot_tube(Figure().subplots())
     assert axes.get_xlabel() == "t (s)"
-
-
-# the package
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """Lint: each finding where it belongs, and nothing said of good files."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -91,9 +91,6 @@ def assert_witness(model, proof, rate, box):
     assert has_a_positive_direction(restricted(model, x, rate))
 
 
-# -- the facts -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_the_five_digit_three_state_metric_is_certified():
     proof = verdict_of(three_state(), BOX_THREE)
@@ -154,9 +151,6 @@ def test_the_five_digit_two_state_metric_is_certified():
     assert proof.largest_rate.below == pytest.approx(1.74358, abs=2e-5)
     assert proof.lower_on_set.above == pytest.approx(0.20086, abs=1e-5)
     assert proof.upper_on_set.above == pytest.approx(0.32823, abs=1e-5)
-
-
-# -- an independent proof: bisection in ball arithmetic on formulas written by hand ---------------------------
 
 
 def balls_of(box):
@@ -252,9 +246,6 @@ def test_the_models_forms_are_those_written_by_hand():
         assert mine == forms[rows]
     model, forms = two_state(), two_forms(x[:2], Fraction)
     assert [[exact(e, model, x[:2]) for e in row] for row in model.drift_form] == forms["F0"]
-
-
-# -- what must be refused ------------------------------------------------------------------------------------
 
 
 def sampled_rate(dW):
@@ -371,9 +362,6 @@ def test_a_drift_that_cannot_be_bounded_within_the_budget_is_no_crash():
     assert "no positive rate" in why(proof)
 
 
-# -- invariance ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", ["1e-2", "0.3", "1e2"])
 def test_scaling_the_metric_changes_no_rate(factor):
@@ -407,9 +395,6 @@ def test_a_smaller_set_supports_no_smaller_rate():
     for wide, narrow in pairwise(rates):
         assert narrow.above >= wide.below
         assert narrow.below >= wide.below - 1e-3
-
-
-# -- inputs that depend on the state -------------------------------------------------------------------------
 
 
 def turned(rate):

@@ -1,7 +1,5 @@
 """What would help, in words."""
 
-from __future__ import annotations
-
 from tubecert.claims.advice import HalveConstant
 from tubecert.words.advice import advice as words
 

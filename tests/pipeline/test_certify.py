@@ -1,7 +1,5 @@
 """End to end: specifications in, results out, against the facts of the literature and invariances."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from fractions import Fraction

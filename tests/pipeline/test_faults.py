@@ -1,7 +1,5 @@
 """Untrusted pieces that lie: whatever a search hands over, nothing is certified that is not true."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from dataclasses import replace
@@ -101,9 +99,6 @@ def test_what_a_lying_search_leaves_certified_is_confirmed(monkeypatch):
     found = recheck(certificate.dump(certificate.seal(result, {})), "made")
     assert found.verdict == "confirmed", found.failing
     assert "curve" not in result["conditions_26"]
-
-
-# --- the kernel itself
 
 
 @pytest.mark.parametrize("kind", [kind_of(key) for key in KEYS], ids=lambda kind: kind.key)

@@ -1,7 +1,5 @@
 """Gaps by effect: gains as with close constants, enclosures that hold, and certificates that say what was done."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Outputs: the half-widths of linear combinations of the states, proposed, proven, reported and examined."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Plans and families of plans: a member keeps to the boxes between its knots as well, and to the defect."""
 
-from __future__ import annotations
-
 import json
 from fractions import Fraction
 

@@ -4,8 +4,6 @@ Theorems 0, A and B are about the loop, not about how it is written: omega is 1/
 u^2 (the s of B is that of sigma'); distances have no unit, half-widths those of their states.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 

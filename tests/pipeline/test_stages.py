@@ -1,7 +1,5 @@
 """Stages are values that cannot exist unproven; what does not depend on a changed key is not computed again."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from fractions import Fraction
 from pathlib import Path
@@ -180,9 +178,6 @@ def test_another_gap_or_budget_is_proven_anew():
     for options in (Options(), Options(gap=Fraction(1, 50)), Options(budget=1_000_000)):
         prove_metric(question_of(THREE, options, memory=memory))
     assert memory.computed["metric"] == 3
-
-
-# --- no stage without its proof
 
 
 @pytest.fixture(scope="module")

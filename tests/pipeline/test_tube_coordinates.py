@@ -1,7 +1,5 @@
 """Tubes measured by the metric, end to end: gains depend on no units, only half-widths must fit into the safe set."""
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 from pathlib import Path

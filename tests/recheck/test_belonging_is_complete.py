@@ -1,7 +1,5 @@
 """`--spec` compares every key, and tells every override and every other text (R23)."""
 
-from __future__ import annotations
-
 import pytest
 from rechecked import certified, respecified, sealed
 from systems import SMALL

@@ -1,7 +1,5 @@
 """Bounds of M that a specification declares are examined on the safe set (R21): certify refutes what is not true."""
 
-from __future__ import annotations
-
 import pytest
 from rechecked import certified, examine, failing, respecified
 from systems import SMALL

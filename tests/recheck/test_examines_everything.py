@@ -4,8 +4,6 @@ The table (`recheck.examines`) is walked against certificates, against the JSON 
 key without a row fails, a row without a key fails, and so does a row that names a claim which nobody makes.
 """
 
-from __future__ import annotations
-
 import copy
 import json
 from functools import cache
@@ -156,9 +154,6 @@ def test_every_row_has_a_key_and_a_claim():
     assert [
         row for row in EXAMINED if row not in found and not any(matches(row, path) for path in known)
     ] == []
-
-
-# -- notes
 
 
 def test_notes_are_no_part_of_what_is_hashed_and_are_not_examined():

@@ -119,9 +119,6 @@ def test_what_is_certified_shows_no_point():
     assert found.failing.name == "the verdict follows from the sections"
 
 
-# -- planted bugs ------------------------------------------------------------------------------------------------
-
-
 def half_slope(e, d):
     return true_slope(e, d) * Fraction(1, 2) if e.op == "sin" else true_slope(e, d)
 
@@ -196,9 +193,6 @@ def test_a_bug_in_the_producer_is_caught(bug, monkeypatch):
     assert any(part in claim for part in claims.split("|") for claim in failing), failing
 
 
-# -- documents ---------------------------------------------------------------------------------------------------
-
-
 HEAD = '{"format": "tubecert-certificate/3"'
 RUN = HEAD + ', "run": {}, "hash": "x", "result": {"verdict": '
 NINES = '{"x": ' + "9" * 10_000 + "}"
@@ -257,9 +251,6 @@ def test_a_refuted_metric_is_confirmed_at_its_witness():
     result["verdict"] = "certified"
     with pytest.raises(TubecertError):
         examine(written(result))
-
-
-# -- the command -------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """Matrices in parts that no entry joins: a claim for each, in its own variables, is the claim for all of them."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from types import SimpleNamespace
 

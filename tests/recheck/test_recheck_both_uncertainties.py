@@ -1,7 +1,5 @@
 """h as an expression with bounds declared beside it: what is printed holds for both of them, or is not confirmed."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest

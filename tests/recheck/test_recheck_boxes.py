@@ -69,9 +69,6 @@ def samples(box, count=200, seed=0):
     return lo + np.vstack([shares, corners, [[0.5] * len(box)]]) * (hi - lo)
 
 
-# -- checks, each of them sound on the right code and failing on some broken one ---------------------------------------
-
-
 def check_monomials():
     points = samples([(-1.0, 1.0)] * 3, 30)
     for expressions in ([text] for text in FEW):

@@ -1,7 +1,5 @@
 """What recheck knows of plans without boxes: a start with roots exactly, a drift along knots part by part."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

@@ -3,8 +3,6 @@
 Findings R1 (a plan without a horizon), R2 (names that shadow constants), R3 (unknown members), R9 (numbers).
 """
 
-from __future__ import annotations
-
 import copy
 import json
 import time
@@ -198,9 +196,6 @@ def test_what_h_owes_is_owed_at_all_times():
     assert failing(examine(document)) == []
     (found,) = failing(examine(respecified(document, owes), 2_000))
     assert found[0] == "f, B, W, h and the plan are smooth"
-
-
-# -- names ---------------------------------------------------------------------------------------------------------
 
 
 def renamed(document, old, new):

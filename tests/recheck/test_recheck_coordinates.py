@@ -4,8 +4,6 @@ The certificate is not the producer's: the system is written in z by hand, certi
 found is told of the system in x. Every statement about z must then be confirmed from S alone.
 """
 
-from __future__ import annotations
-
 import copy
 from fractions import Fraction
 from itertools import product

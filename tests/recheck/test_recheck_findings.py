@@ -1,7 +1,5 @@
 """Findings that have no other place: what plans owe (R6), which file a certificate is of (R4, R5), R7, S7, S8."""
 
-from __future__ import annotations
-
 import copy
 import math
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Every number that a certificate of 0, A and B states, made a little better than it is: the claim about it fails."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from fractions import Fraction
@@ -206,9 +204,6 @@ def test_what_is_stated_worse_than_it_is_stays_confirmed(honest, name):
     assert failed(honest, WEAKER[name]) == []
 
 
-# -- where the start counts alone, and where what is told is not certified
-
-
 def test_a_distance_below_the_start_is_refused_where_d_falls_from_there():
     far = examined(
         SMALL.replace("0.1*sin(t) + 0.05*x", "0.01*sin(t)").replace("at: [0.05, 0]", "at: [0.15, 0.1]"),
@@ -238,9 +233,6 @@ def test_what_is_told_of_a_feedback_that_does_not_suffice_is_true(strong, name):
     assert strong[0]["result"][ALONE]["verdict"] == "refuted"
     assert "0: what is told of it" in failed(strong, TOLD[name])
     assert failed(strong, lambda r: more(r[ALONE]["margin"], by=-1e-3)) == []
-
-
-# -- what was asked for
 
 
 @pytest.mark.parametrize(("key", "option"), [(A, "26"), (B, "distance")])
@@ -281,9 +273,6 @@ def test_a_predictor_that_was_asked_for_is_the_one_that_is_proven(key, option):
         pair(r, key, predictor_gain=2, adaptation_rate=10**6)
 
     assert any("omega = " in name for name in failed(made, change))
-
-
-# -- inputs
 
 
 @pytest.mark.parametrize(("limits", "holds"), [((-1, 1), True), ((-0.2, 3), False), ((-3, 0.2), False)])

@@ -166,9 +166,6 @@ def test_any_numbers_of_theorems_0_and_b_are_those_of_the_theory(omega):
     assert len(followed) == 2
 
 
-# -- balls that are wide: what cannot be decided is bounded in every case
-
-
 @pytest.fixture
 def precise():
     with ctx.workprec(BITS), mpmath.workdps(oracle.DIGITS):

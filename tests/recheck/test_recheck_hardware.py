@@ -1,7 +1,5 @@
 """A section `hardware` in recheck: it is read to the last key, no claim rests on it, and the certificate says so."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest

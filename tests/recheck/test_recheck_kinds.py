@@ -232,9 +232,6 @@ def test_a_radius_is_proven_with_sharper_bounds_where_those_that_are_printed_fal
         assert claim.outcome.verdict == verdict, claim
 
 
-# -- which file a certificate belongs to ---------------------------------------------------------------------------
-
-
 @pytest.fixture
 def files(tmp_path):
     def write(text, **options):

@@ -1,7 +1,5 @@
 """Kinks: an h with absolute values, whose largest slope and largest change with t lie on a kink (R8)."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from types import SimpleNamespace
 

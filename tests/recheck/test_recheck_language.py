@@ -1,7 +1,5 @@
 """The language of specifications, read and evaluated by recheck on its own."""
 
-from __future__ import annotations
-
 import copy
 
 import pytest

@@ -1,7 +1,5 @@
 """An f that depends on t: C2 and every constant hold at all times of the horizon, for the producer and for recheck."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Norms of columns about a plan that stays: a multiplier decides them in few boxes, and confirms nothing false."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Quotients are cancelled to terms of the same values, of which definiteness is told on few boxes."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

@@ -4,8 +4,6 @@ C2 is about the null space of B', so it shows the rank where there are fewer inp
 left inverse. Where there are as many inputs as states nothing else asks for it.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Small files that would keep the checker busy for hours."""
 
-from __future__ import annotations
-
 import pytest
 
 from tubecert.recheck.balls import exact

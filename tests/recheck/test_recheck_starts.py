@@ -1,7 +1,5 @@
 """What is stated of starts of every kind: d0, H0 and the radius, each made a little better than it is."""
 
-from __future__ import annotations
-
 import copy
 from fractions import Fraction
 from typing import Any

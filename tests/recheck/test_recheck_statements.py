@@ -3,8 +3,6 @@
 The value on every box is known exactly: what is said to hold a little beyond it is wrong.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -263,9 +261,6 @@ def test_a_gain_needs_the_rest_of_the_expansion_and_both_ends(monkeypatch):
     monkeypatch.setattr(GainBelow, "_holds", lambda self, e, ends: true_holds(self, e, (ends[0], ends[0])))
     long._left.clear()
     assert long.over([]).proven
-
-
-# -- constants without a bound
 
 
 @pytest.mark.slow

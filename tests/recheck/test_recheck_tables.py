@@ -1,7 +1,5 @@
 """Functions of tables in certificates: they hold the points, recheck reads and evaluates them on its own."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import replace
 from fractions import Fraction

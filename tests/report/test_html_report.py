@@ -105,9 +105,6 @@ def section(certificate, key):
     return found
 
 
-# -- the page as a document
-
-
 @pytest.mark.slow
 def test_well_formed_with_unique_anchors_that_resolve(any_certificate):
     page = parsed(any_certificate)
@@ -207,9 +204,6 @@ def test_scripts_in_texts_are_shown_as_texts():
     assert any("<script>" in (x.text or "") for d in page.drawings for x in d.iter()), "units label the axes"
 
 
-# -- what it says
-
-
 @pytest.mark.slow
 def test_verdict_gains_margins(regulated):
     page = parsed(regulated)
@@ -286,9 +280,6 @@ def test_provenance_and_how_to_check(any_certificate):
     text = parsed(any_certificate).text
     for word in (any_certificate["hash"], RUN["command"], "numpy 2.4", RUN["started"], "tubecert recheck"):
         assert word in text
-
-
-# -- figures
 
 
 def figures(certificate):
@@ -449,9 +440,6 @@ def test_numbers_of_drawings(value):
     assert text != "-0"
 
 
-# -- what the certificate holds for the figures
-
-
 def test_samples_lie_on_the_plan(orbit):
     samples = orbit["notes"]["plan"]["samples"]
     horizon = float(orbit["result"]["spec"]["effective"]["trajectory"]["horizon"])
@@ -492,9 +480,6 @@ def test_a_margin_around_is_the_margin_of_those_gains(regulated):
             assert data[claim][i] == pytest.approx(float(margin.lo), rel=1e-8, abs=1e-9)
 
 
-# -- Markdown
-
-
 def test_markdown_says_the_same(any_certificate):
     text = markdown.render(told(any_certificate))
     plain = text.replace("\\", "")
@@ -520,9 +505,6 @@ def test_markdown_tables_keep_their_columns(text):
         else:
             width = None
     assert sum(line.startswith("# ") for line in lines) == 1
-
-
-# -- the command line
 
 
 @pytest.fixture

@@ -169,9 +169,6 @@ def test_numbers_are_short():
     assert short(float("inf")) == "-"
 
 
-# findings
-
-
 def finding(severity=Severity.ERROR):
     place = Location(file="plant.yaml", line=3, column=5, source="f: [x^2]", width=3)
     return Finding(
@@ -193,9 +190,6 @@ def test_findings_as_data():
     place = {"file": "plant.yaml", "line": 3, "column": 5, "help": "write **"}
     own = {"code": "TC109", "severity": "error", "message": "^ is not allowed", **place}
     assert to_json(findings.as_data(finding())) == own
-
-
-# terminal
 
 
 @pytest.mark.parametrize(

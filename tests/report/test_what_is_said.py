@@ -75,9 +75,6 @@ def test_it_is_said_once(verdict, told):
     assert ("if it starts" in console.meaning(result).plain) is not bool(told)
 
 
-# W
-
-
 def said_of(*entries):
     """The words about W (2, 2) in the report of a synthesis that was asked for a constant family."""
     known = {"below": 1.0, "above": 2.0}

@@ -44,9 +44,6 @@ def drawn():
     """Figures are wanted."""
 
 
-# what comes out
-
-
 @pytest.mark.slow
 def test_a_campaign_that_finds_nothing(files, drawn):
     result = command("--runs", "8", "--controllers", "ccm,l1,reference")
@@ -128,9 +125,6 @@ def test_a_broken_promise_is_loud_and_can_be_replayed(files):
     assert worst == pytest.approx(next(iter(named.values())), rel=1e-3)
 
 
-# runs do not depend on how they are grouped; interruption keeps what is finished
-
-
 @pytest.mark.slow
 def test_runs_do_not_depend_on_their_batches(monkeypatch):
     where = setting("flat", duration="2")
@@ -195,9 +189,6 @@ def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
     assert result.stdout.startswith("no result flat: ")
 
 
-# mistakes
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -252,9 +243,6 @@ def test_a_metric_of_its_own(files):
     result = run("simulate", "flat.yaml", "--metric", "w.json", "--runs", "0")
     assert result.exit_code == 1
     assert "metric" in result.output, result.output
-
-
-# loops whose runs take very many steps; geodesics of a lower degree
 
 
 def with_upper(own, share):

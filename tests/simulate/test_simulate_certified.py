@@ -156,9 +156,6 @@ def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
     assert found.h != setting("three_state").h
 
 
-# kinds of certificates
-
-
 @pytest.mark.slow
 def test_kinds_are_named_alike_everywhere():
     assert set(KINDS) == {name.option for name in NAMES} == set(PREFERRED)

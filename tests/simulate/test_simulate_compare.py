@@ -219,9 +219,6 @@ def test_an_uncertainty_in_its_class_passes_and_may_leave_it_after_the_tube_is_l
     check_class(where, outside, h_of("0.2*sin(t)*(1 + 0*p)"), "uncertainty.h")
 
 
-# every number of a promise and of a class, written a second time from the theory
-
-
 @pytest.fixture
 def numbers():
     """A certificate by hand, whose constants are all different."""

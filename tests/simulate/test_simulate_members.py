@@ -140,9 +140,6 @@ def test_runs_along_several_plans_are_numbered_through():
     assert merged([own, replace(own, settled=None)]).settled is None
 
 
-# -- a planner that replans
-
-
 @pytest.mark.slow
 def test_a_new_plan_starts_where_the_old_one_is():
     """x* goes on, u* jumps, f(x*) + B u* = x*' on both sides; what is not reached of a plan is no part of it."""

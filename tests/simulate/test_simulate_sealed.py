@@ -176,9 +176,6 @@ def test_a_disk_that_is_full_does_not_stop_anything(kernels, monkeypatch):
     assert used(kernels) == (41.0, False)
 
 
-# the key
-
-
 def test_the_key_is_the_users_alone(state):
     secret = user_key()
     path = state / "cache.key"
@@ -226,9 +223,6 @@ def test_without_a_place_for_the_key_nothing_is_kept(kernels, tmp_path, monkeypa
     assert used(kernels) == (41.0, False)
     assert not list((tmp_path / "__pycache__").glob("*.kernel"))
     assert used(kernels) == (41.0, False)
-
-
-# what is certified
 
 
 @pytest.mark.slow

@@ -62,9 +62,6 @@ def test_a_state_that_is_no_number_is_not_followed():
     assert failure.reason == "the state diverges from the plan"
 
 
-# what the user is told
-
-
 def thinner(where, factor):
     """The setting with a tube that is thinner than it was certified."""
     own = where.certified

@@ -1,7 +1,5 @@
 """pi and degrees in a specification: sets shrink, starts and bounds grow, by less than anything matters."""
 
-from __future__ import annotations
-
 import json
 from fractions import Fraction
 from pathlib import Path

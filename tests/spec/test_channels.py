@@ -1,7 +1,5 @@
 """Bounds of h by input: what they say together is never less than what they say apart."""
 
-from __future__ import annotations
-
 import json
 from fractions import Fraction
 

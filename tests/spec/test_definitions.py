@@ -1,7 +1,5 @@
 """Definitions: a name for an expression, which stands for it everywhere, what it owes included."""
 
-from __future__ import annotations
-
 import time
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What users write by mistake, and what they are told: the table is `mistakes.MISTAKES`."""
 
-from __future__ import annotations
-
 import json
 import re
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Keys that are set from outside the file: the same system as the file that says so, and located errors."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Parameters of which a range is known: read, in the middle for the controller, canonical, in f and B alone."""
 
-from __future__ import annotations
-
 import json
 from fractions import Fraction
 

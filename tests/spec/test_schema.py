@@ -1,7 +1,5 @@
 """The JSON Schemas: they say what the readers and the writer say, and an editor that has only them agrees."""
 
-from __future__ import annotations
-
 import ast
 import copy
 import json
@@ -79,9 +77,6 @@ def described(schema: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def test_every_key_is_described(name):
     for path, value in described(SCHEMAS[name]):
         assert value.get("description") or "$ref" in value, path
-
-
-# specification
 
 
 @pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
@@ -250,18 +245,12 @@ def test_every_config_names_the_schema(path):
     assert (path.parent / target).resolve() == (PACKAGE / "schemas/spec.schema.json").resolve()
 
 
-# metric file
-
-
 def test_the_metric_file_has_the_keys_of_its_reader():
     from tubecert.spec import metric_file
 
     known = {"format", "rate", "dual_metric", *metric_file._REPORTED}
     assert set(SCHEMAS["metric"]["properties"]) == known
     assert SCHEMAS["metric"]["properties"]["format"]["const"] == metric_file.FORMAT
-
-
-# certificate
 
 
 def closed(schema: Any) -> Any:
@@ -318,9 +307,6 @@ def test_what_is_no_certificate_does_not_fit(change):
     assert not [e for e in errors("certificate", sealed) if "hash" not in e]
     sealed["result"].update(change)
     assert [e for e in errors("certificate", sealed) if "hash" not in e]
-
-
-# reference
 
 
 def test_the_reference_is_what_the_schemas_say():

@@ -1,7 +1,5 @@
 """The specification: what loads, what is refused (with code, line and column), and nothing else."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 import json
@@ -44,9 +42,6 @@ def place(finding: Finding) -> str:
 def minimal(old: str, new: str) -> str:
     assert old in MINIMAL
     return MINIMAL.replace(old, new)
-
-
-# files: dropping one into specs/ok or specs/bad adds a test
 
 
 @pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
@@ -101,9 +96,6 @@ def test_every_code_is_met_and_explained() -> None:
     met = {match[0] for path in BAD for match in EXPECT.findall(path.read_text())}
     assert met <= set(CODES)
     assert not set(CODES) - met
-
-
-# values
 
 
 def test_three_state() -> None:
@@ -274,9 +266,6 @@ def test_specs_are_values() -> None:
         spec.name = "other"  # type: ignore[misc]
     with pytest.raises(TypeError):
         spec.locations["name"] = None  # type: ignore[index]
-
-
-# refusals
 
 
 def test_every_problem_is_reported_at_once_in_the_order_of_the_file() -> None:

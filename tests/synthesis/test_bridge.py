@@ -104,9 +104,6 @@ def test_inaccurate_is_not_finished(monkeypatch):
     assert not found.finished
 
 
-# -- names
-
-
 @pytest.mark.parametrize(
     ("solver", "why"),
     [("cvxpy:NONESUCH", "is not installed"), ("cvxpy:OSQP", "does not solve semidefinite programs")],
@@ -139,9 +136,6 @@ def test_the_specification_names_it_too():
     assert canonical(small("cvxpy:scs"))["metric"]["synthesise"]["solver"] == "cvxpy:SCS"
     with pytest.raises(SpecError, match="cvxpy:NONESUCH cannot be used"):
         pipeline.certify(small("cvxpy:NONESUCH"), pipeline.Options())
-
-
-# -- whole runs
 
 
 @pytest.mark.slow

@@ -79,9 +79,6 @@ def proven(asked, proposal, rate):
     return outcome.condition_number
 
 
-# -- forms against the exact expressions of the model ------------------------------------------------------------
-
-
 def random_coefficients(family, seed=0):
     n = len(family.states)
     raw = np.random.default_rng(seed).integers(-9, 10, (len(family.functions), n, n)) / 8
@@ -137,9 +134,6 @@ def test_orthonormal_functions_are_the_same_family():
         np.testing.assert_allclose(ours, theirs, atol=1e-7 * np.abs(theirs).max())
 
 
-# -- symmetries and affine variables ------------------------------------------------------------------------------
-
-
 def test_symmetries_are_found_and_halve_the_unknowns():
     family = metric_family(PVTOL, degree=2)
     ends = np.array([[float(a), float(b)] for a, b in PVTOL_BOX])
@@ -186,9 +180,6 @@ def test_affine_variables_are_those_of_the_conditions():
     assert names(TWO, TWO_BOX, 0) == []
 
 
-# -- sampling and branch and bound ----------------------------------------------------------------------------------
-
-
 def test_climbers_find_a_narrow_peak_inside_the_region():
     peak = np.array([0.73, -0.21, 1.0])
 
@@ -218,9 +209,6 @@ def test_counterexamples_are_found_and_good_metrics_pass():
     attacker = Attacker.of(faster, FormsTape(TWO, faster.family), none, np.random.default_rng(0))
     assert attacker.rates(good, found.at[None])[0] < 1.8
     assert counterexample(asked, -good, none, (0, 1)).condition == "C1"
-
-
-# -- whole runs -----------------------------------------------------------------------------------------------------
 
 
 def cvxpy_least(A, B, rate, floor=None):
@@ -370,9 +358,6 @@ def test_limit_and_progress():
     assert found.feasible is False
     assert "limit" in found.status
     assert cegis.propose(problem(TWO, TWO_BOX, 1.5, progress=told.append)).rounds == len(told) > 0
-
-
-# -- solvers that lie -----------------------------------------------------------------------------------------------
 
 
 def lying(change):

@@ -38,9 +38,6 @@ def run(*arguments):
     return CliRunner().invoke(app, ["synth", "--no-progress", *map(str, arguments)], catch_exceptions=False)
 
 
-# -- systems written from their equations
-
-
 @pytest.mark.usefixtures("barely")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["pendulum", "car"])
@@ -85,9 +82,6 @@ def test_the_kind_that_decides_is_what_a_metric_is_chosen_for():
     assert found.file.rate == best.rate
 
 
-# -- nothing certifies
-
-
 @pytest.mark.slow
 def test_where_nothing_certifies_nothing_is_written(tmp_path):
     text = (ROBOTS / "pendulum.yaml").read_text().replace("epsilon: 0.1", "epsilon: 1")
@@ -119,9 +113,6 @@ def test_a_certificate_that_says_so_is_read_and_rechecked(tmp_path):
     for command in ("recheck", "report"):
         again = CliRunner().invoke(app, [command, target], catch_exceptions=False)
         assert again.exit_code in (0, 4), again.output
-
-
-# -- the climb itself
 
 
 class Valley:
@@ -255,9 +246,6 @@ def test_the_start_is_free_of_units(scale):
     assert slow_scale(build(free), free) == Fraction(75, 100)
     moving = load_text(CHAIN.format(slope=-4, p=scale, v=3))
     assert slow_scale(build(moving), moving) == Fraction(1, 2)
-
-
-# -- deadlines, interruptions
 
 
 class Clock:

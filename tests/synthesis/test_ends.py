@@ -64,9 +64,6 @@ def missing(share):
     return {"claim": claim, "mend": MendPlan(defect=share, share=share, remedy=CorrectPlan())}
 
 
-# -- a plan that no metric serves
-
-
 def test_two_rates_that_fail_by_the_plan_end_it():
     """The defect of a trim with three digits: 240 s of metrics that all failed by it."""
     for what in (missing(3.0), {"claim": PlanBounded()}):
@@ -115,9 +112,6 @@ def test_a_plan_that_is_none_is_said_after_two_rates(tmp_path):
     assert not (tmp_path / "m.json").exists()
 
 
-# -- nothing better is asked for
-
-
 def test_the_first_tube_without_adaptation_is_enough_where_nothing_better_is_asked_for():
     """A satellite took 143 s to a metric whose report said that its tube needs no adaptation."""
 
@@ -156,9 +150,6 @@ def test_synth_ends_with_the_first_of_them_unless_an_objective_is_asked_for(tmp_
     assert [words in each for each in said] == [True, False]
 
 
-# -- nothing certifies
-
-
 @pytest.mark.slow
 def test_what_certifies_by_another_certificate_only_is_not_written(tmp_path):
     """Exit code 0, `metric proven` and a file, where B held and what decides did not."""
@@ -172,9 +163,6 @@ def test_what_certifies_by_another_certificate_only_is_not_written(tmp_path):
     assert done.stdout.startswith("undecided lag: the metric at rate 0.2 1/s does not certify")
     path.write_text(hopeless + "conditions: {decides: B}\n")
     assert CliRunner().invoke(app, arguments).exit_code == 0
-
-
-# -- out of reach
 
 
 def chain(states, *moving):

@@ -62,9 +62,6 @@ def verified(asked, proposal, rate, digits=6):
     return verify_metric(exact, asked.safe_set, Effort(gap=0.1, budget=100_000))
 
 
-# -- the conic programs ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_largest_eigenvalue_is_a_conic_program(solver):
     a = np.random.default_rng(1).normal(size=(6, 6))
@@ -144,9 +141,6 @@ def test_both_solvers_and_cvxpy_agree(seed, n, blocks):
         assert answer.objective == pytest.approx(oracle.value, rel=1e-4, abs=1e-4)
 
 
-# -- charts: from values to coefficients -------------------------------------------------------------------------------
-
-
 def test_coefficients_of_a_polynomial_in_an_angle_and_a_state():
     """What is read off the nodes is the function, everywhere: 2 sin q cos q x^2 + x - 3 cos^2 q on an uneven box."""
     variables = Variable(name="q", lo=-0.5, hi=1.2, angle=1), Variable(name="x", lo=-1.0, hi=3.0, angle=0)
@@ -188,9 +182,6 @@ def test_degrees_count_angles_once_and_refuse_what_is_no_polynomial():
         degrees_of([q * sin(q)])
     with pytest.raises(NotPolynomialError, match="reaches pi"):
         Variable(name="q", lo=-1.0, hi=3.2, angle=1)
-
-
-# -- Gram forms -------------------------------------------------------------------------------------------------------
 
 
 def gram_value(form, entries, half, u):
@@ -265,9 +256,6 @@ def test_in_one_variable_sums_of_squares_are_exact(coefficients):
     assert least(coefficients) == pytest.approx(sampled, abs=1e-4)
 
 
-# -- the conditions ---------------------------------------------------------------------------------------------------
-
-
 def rational(V):
     return [[[Q(float(x)) for x in row] for row in v] for v in V]
 
@@ -337,9 +325,6 @@ def benchmark():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-# -- proposals --------------------------------------------------------------------------------------------------------
 
 
 def test_with_as_many_inputs_as_states_the_identity_is_best():

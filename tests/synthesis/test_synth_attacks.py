@@ -57,9 +57,6 @@ def small(metric="metric: {synthesise: {rate: 0.5, degree: 0}}"):
     return SPEC.replace("METRIC", metric)
 
 
-# -- refuted: exactly, and only what is impossible
-
-
 def at_origin(system, rate):
     return uncontrollable_mode(system, [(Fraction(0),) * len(system.states)], Fraction(rate))
 
@@ -148,9 +145,6 @@ def test_a_lost_rank_is_named_with_its_point():
     assert found.verdict == "refuted"
     assert isinstance(found.reason.claim.failure, RankUnproven)
     assert found.reason.at is not None
-
-
-# -- written: read back and proven again, with the numbers that the file says
 
 
 WISHES = {
@@ -271,9 +265,6 @@ def test_a_certificate_of_a_synthesised_metric_is_consistent(tmp_path):
     assert result["synthesis"]["rate"] == metric["rate"]
     assert kept["solver"] == result["synthesis"]["solver"]
     assert "seconds" not in json.dumps(result["synthesis"])
-
-
-# -- files: nothing that somebody wrote is lost
 
 
 def refuses(done, words):

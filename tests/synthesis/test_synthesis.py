@@ -61,9 +61,6 @@ ROLLING = model(("a", "b", "c"), ("b + sin(a)", "c - a**2", "-c"), [["0"], ["0"]
 MODELS = [CART_POLE, ARM, OBLIQUE, ROLLING]
 
 
-# -- C3 on the coefficients
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("system", MODELS, ids=["cart-pole", "arm", "oblique", "rolling"])
 @settings(max_examples=2, deadline=None)
@@ -98,9 +95,6 @@ def test_frames_are_independent_everywhere(system):
     assert np.abs(np.linalg.det(matrices)).min() > 0.3
 
 
-# -- rounding
-
-
 @pytest.mark.slow
 @given(
     st.integers(2, 9), st.lists(st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-3), min_size=4, max_size=4)
@@ -120,9 +114,6 @@ def test_rounding_is_symmetric_and_as_near_as_its_digits(digits, entries):
 def test_digits_below_are_below(value, digits):
     low = digits_below(value, digits)
     assert 0 < low <= Fraction(value) <= low * (1 + Fraction(10) ** (1 - digits))
-
-
-# -- uncontrollable modes
 
 
 @given(st.integers(1, 4).flatmap(lambda n: st.lists(st.integers(-4, 4), min_size=n * n, max_size=n * n)))
@@ -198,9 +189,6 @@ def test_a_proof_that_runs_out_of_boxes_asks_for_more_of_them(tmp_path):
 
 def test_the_box_is_shrunk_about_its_centre():
     assert shrunk(((Fraction(0), Fraction(4)),), Fraction(1, 2)) == ((Fraction(1), Fraction(3)),)
-
-
-# -- solvers that lie
 
 
 def liar(kind, seed=0):
@@ -286,9 +274,6 @@ def test_an_infeasible_answer_marked_optimal_is_rejected_with_its_reason():
     assert isinstance(outcome.outcome.condition, MetricContraction)
 
 
-# -- the command
-
-
 def synth(*arguments):
     return CliRunner().invoke(app, ["synth", *map(str, arguments)])
 
@@ -364,9 +349,6 @@ def test_the_end_to_end_objective_compares_certificates(tmp_path):
     assert plot.read_text().startswith("<?xml")
     content = json.loads(done.stdout)
     assert content["rate"] == 1.5
-
-
-# -- condition numbers as small as they can be
 
 
 @pytest.mark.slow

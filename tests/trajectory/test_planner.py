@@ -87,9 +87,6 @@ def problem(**changes):
     return ilqr.Problem(**(given | changes))
 
 
-# -- the planner -----------------------------------------------------------------------------------------------
-
-
 def test_derivatives_of_a_step_are_those_of_the_step():
     dynamics = Dynamics(MODEL)
     rng = np.random.default_rng(0)
@@ -141,9 +138,6 @@ def test_a_linear_problem_is_solved_as_riccati_solves_it():
         assert found.x[k] == pytest.approx(x, abs=1e-9)
         assert found.u[k] == pytest.approx(-K @ x, abs=1e-8)
         x = (A - B @ K) @ x
-
-
-# -- from a plan to a curve ------------------------------------------------------------------------------------
 
 
 def test_times_are_decimals_and_end_at_the_horizon():
@@ -217,9 +211,6 @@ def test_a_planner_that_fails_says_what_to_change(f, options, code, said, help):
     assert (caught.value.exit_code, finding.code, finding.location.line) == (ExitCode.INVALID, code, 7)
     assert said in finding.message
     assert help in finding.help
-
-
-# -- the cache -------------------------------------------------------------------------------------------------
 
 
 def counted(monkeypatch):

@@ -85,9 +85,6 @@ def pieces_at(data: Knots, t: Fraction):
     return [k for k in range(len(data.t) - 1) if data.t[k] <= t <= data.t[k + 1]]
 
 
-# -- the curve -------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 @given(ends=st.tuples(*[fractions(0, "13/10", 500)] * 3))
@@ -192,9 +189,6 @@ def test_fixed_variables_enter_with_their_whole_range():
         assert (value <= high + 1e-12).all()
 
 
-# -- the defect ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 def test_the_defect_lies_between_its_bounds(interpolation):
@@ -283,9 +277,6 @@ def test_the_norm_in_a_metric_is_proven_from_both_sides():
         assert (below >= exact * (1 - 1e-9)).all()
 
 
-# -- the tube --------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 def test_inputs_that_jump_together_are_not_mixed(interpolation):
     """sup |f + B u*| over the tube of a plan whose two inputs jump at the same times, against samples."""
@@ -310,9 +301,6 @@ def test_inputs_that_jump_together_are_not_mixed(interpolation):
         seen = max(seen, float(np.hypot(np.sin(p[1]) + held[0], held[1] - p[0]).max()))
     assert seen <= found.above
     assert found.below <= seen * (1 + 1e-3)
-
-
-# -- the safe set ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -1,12 +1,10 @@
 """Both sides of every constant in both arithmetics: `above` is confirmed, a little below `below` never is.
 
-    python tests/harness/agreement.py plant.certificate.json ... [--boxes 2000]
+    python benchmarks/agreement.py plant.certificate.json ... [--boxes 2000]
 
 "contradicted" is a proof that the bound of the certificate is attained within the gap; "undecided" is none, and no
 disagreement. Exit code 1 if a bound is confirmed that lies below what the certificate says is attained.
 """
-
-from __future__ import annotations
 
 import argparse
 import sys
@@ -14,7 +12,7 @@ import time
 from fractions import Fraction
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from flint import ctx
 
