@@ -11,19 +11,20 @@ from collections.abc import Mapping
 
 from tubecert.records import FormError
 
-Tree = Mapping[str, "Tree"]
+Places = Mapping[str, "Places"]
 
-_WHOLE: Tree = {}
-_SHORTFALL: Tree = dict.fromkeys(("constant", "allowed", "needed", "missing"), _WHOLE)
-_GAINS: Tree = {"shortfalls": _SHORTFALL, "curve": _WHOLE, "margins_around": _WHOLE}
-NOTES: Tree = {
+_EVERY = "*"
+_WHOLE: Places = {}
+_SHORTFALL: Places = dict.fromkeys(("constant", "allowed", "needed", "missing"), _WHOLE)
+_GAINS: Places = {"shortfalls": _SHORTFALL, "curve": _WHOLE, "margins_around": _WHOLE}
+NOTES: Places = {
     "effort": _WHOLE,
     "elasticities": _WHOLE,
     "synthesis": {"search": _WHOLE},
     "reasons": {"relax": _WHOLE, "binds": _WHOLE},
     "plan": {"samples": _WHOLE},
     "clearance": {"t": _WHOLE, "inside": _WHOLE},
-    "constants": {"*": dict.fromkeys(("symbol", "equation", "unit", "at"), _WHOLE)},
+    "constants": {_EVERY: dict.fromkeys(("symbol", "equation", "unit", "at"), _WHOLE)},
     "no_adaptation": {"shortfalls": _SHORTFALL},
     "conditions_26": {**_GAINS, "bandwidth_infimum": _WHOLE, "binds": _WHOLE},
     "distance": _GAINS,
@@ -44,7 +45,7 @@ def joined(result: object, notes: object) -> object:
     return whole
 
 
-def _split(value: object, tree: Tree) -> tuple[object, object]:
+def _split(value: object, tree: Places) -> tuple[object, object]:
     if isinstance(value, list):
         parts = [_split(item, tree) for item in value]
         noted = [own for _, own in parts]
@@ -53,7 +54,7 @@ def _split(value: object, tree: Tree) -> tuple[object, object]:
         return value, {}
     stays, told = {}, {}
     for key, own in value.items():
-        inner = tree.get(key, tree.get("*"))
+        inner = tree.get(key, tree.get(_EVERY))
         if inner is _WHOLE:
             told[key] = own
             continue

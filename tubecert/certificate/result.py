@@ -309,10 +309,12 @@ class Certificate:
     @classmethod
     def from_json(cls, data: Json) -> Certificate:
         """What a file says; raises `FormError`. The hash is not compared."""
-        if not isinstance(data, dict) or "notes" not in data:
-            raise FormError("certificate.notes", "is missing")
-        own = {key: value for key, value in data.items() if key != "notes"}
-        return from_json(cls, own | {"result": joined(data.get("result"), data["notes"])}, "certificate")
+        match data:
+            case {"notes": notes, "result": result, **rest}:
+                return from_json(cls, {**rest, "result": joined(result, notes)}, "certificate")
+            case {"result": _}:
+                raise FormError("certificate.notes", "is missing")
+        return from_json(cls, data, "certificate")
 
     def to_json(self) -> dict[str, object]:
         """What the file says."""
