@@ -67,9 +67,9 @@ def test_certify_finds_a_metric_by_itself_and_recheck_confirms_it(tmp_path):
     ):
         done = CliRunner().invoke(app, arguments, catch_exceptions=False)
         assert done.exit_code == 0, done.output
-    found = json.loads(Path(target).read_text())["result"]["synthesis"]
-    assert found["limits"]["slower"]["cause"] == "distance"
-    assert found["asked"]["coordinates"] == "auto"
+    written = json.loads(Path(target).read_text())
+    assert written["notes"]["synthesis"]["search"]["limits"]["slower"]["cause"] == "distance"
+    assert written["result"]["synthesis"]["asked"]["coordinates"] == "auto"
 
 
 @pytest.mark.slow
