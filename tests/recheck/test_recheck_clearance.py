@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 import yaml
-from rechecked import CONFIGS, certified, examine, failing, respecified, sealed, unconfirmed
+from rechecked import CONFIGS, certified, doubted, examine, failing, respecified, sealed, unconfirmed
 from systems import SMALL
 
 from tubecert.recheck.clearances import _square, _turned
@@ -103,7 +103,16 @@ def test_an_obstacle_that_is_met_refutes_unless_it_does_not_decide():
     told = certified(with_obstacles([{**MET[0], "decide": False}]), conditions="distance")
     assert told["result"]["verdict"] == "certified"
     assert told["result"]["clearance"][0]["verdict"] == "refuted"
-    assert not failing(examine(told))
+    examined = examine(told)
+    assert not failing(examined)
+    assert "clearance.verdict" in examined.unread
+    for change in (
+        {"clearance": [0.5, 0.6]},
+        {"shape": {"diagonal": [1e-9, 1e-9], "beside": [0.0, 0.0]}},
+    ):
+        forged = copy.deepcopy(told)
+        forged["result"]["clearance"][0] |= change
+        assert doubted(sealed(forged))
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 from rechecked import certified, examine, failing, respecified, sealed
-from systems import SMALL
+from systems import BLOWN, SMALL
 
 from tubecert.errors import TubecertError
+from tubecert.recheck.kinds import rates
 
 pytestmark = pytest.mark.slow
 
@@ -233,6 +234,89 @@ def test_what_is_told_of_a_feedback_that_does_not_suffice_is_true(strong, name):
     assert strong[0]["result"][ALONE]["verdict"] == "refuted"
     assert "0: what is told of it" in failed(strong, TOLD[name])
     assert failed(strong, lambda r: more(r[ALONE]["margin"], by=-1e-3)) == []
+
+
+@pytest.fixture(scope="module")
+def asked():
+    """Gains that do for B and not for A, for which 0 decides."""
+    return examined(SMALL, conditions="0", bandwidth=Fraction(5), adaptation_rate=Fraction(26_000))
+
+
+@pytest.fixture(scope="module")
+def weak():
+    """Gains that do for neither."""
+    return examined(SMALL, conditions="0", bandwidth=Fraction("0.5"), adaptation_rate=Fraction(10_000))
+
+
+@pytest.fixture(scope="module")
+def windy():
+    return examined(BLOWN, conditions="distance")
+
+
+def without_gains(r: Result) -> None:
+    """A radius is all that is left of A."""
+    gone = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius", "margins")
+    r[A] |= dict.fromkeys((*gone, "least_adaptation")) | {"ultimate_radius": 1e-9}
+    for name in rates.DERIVED:
+        del r["constants"][name]
+
+
+def no_pairs(r: Result) -> None:
+    """A radius is all that is left of B."""
+    r[B] |= dict.fromkeys(("asked", "least_adaptation", "split")) | {"ultimate_radius": 1e-9}
+
+
+RADIUS_A, RADIUS_B = "A: ultimate radius", "B: ultimate radius"
+TOLD_BESIDE: dict[str, tuple[str, Change, str]] = {
+    "A, better (26a)": (
+        "asked",
+        lambda r: r[A]["margins"].update({"26a": [0.99, 1.0]}),
+        "A: what is told of it",
+    ),
+    "A, better (26b)": (
+        "asked",
+        lambda r: r[A]["margins"].update({"26b": [0.99, 1.0]}),
+        "A: what is told of it",
+    ),
+    "A, better (26c)": (
+        "asked",
+        lambda r: r[A]["margins"].update({"26c": [-1e-3, 1.0]}),
+        "A: what is told of it",
+    ),
+    "A, a radius": ("asked", lambda r: r[A].update(ultimate_radius=1.0), RADIUS_A),
+    "A, a radius in a wind": ("windy", lambda r: r[A].update(ultimate_radius=0.1), RADIUS_A),
+    "A, a radius of no gains": ("windy", without_gains, RADIUS_A),
+    "B, a better margin": (
+        "weak",
+        lambda r: r[B]["asked"].update(margin=[-1e-3, 1.0]),
+        "B: what is told of it",
+    ),
+    "B, a radius": ("weak", lambda r: r[B].update(ultimate_radius=0.1), RADIUS_B),
+    "B, its radius": ("weak", lambda r: r[B]["asked"].update(ultimate_radius=0.1), "B: what is told of it"),
+    "B, a radius of no gains": ("weak", no_pairs, RADIUS_B),
+}
+
+
+@pytest.mark.parametrize("name", TOLD_BESIDE)
+def test_what_is_told_of_gains_that_do_not_suffice_is_true(request, name):
+    made, change, claim = TOLD_BESIDE[name]
+    assert claim in failed(request.getfixturevalue(made), change)
+
+
+def test_what_is_told_of_gains_that_do_not_suffice_may_be_worse(weak):
+    assert failed(weak, lambda r: more(r[B]["asked"]["margin"], by=-0.01)) == []
+    assert failed(weak, lambda r: more(r[A]["margins"]["26a"], by=-0.01)) == []
+
+
+def test_a_tube_that_is_wider_than_it_has_to_be_refutes_nothing():
+    """Its radius is the certificate's own word: what leaves the set is examined at the least that it can be."""
+    made = certified(SMALL.replace("safe_set: {x: [-1", "safe_set: {x: [-0.2"))
+    assert made["result"]["verdict"] == "refuted"
+    assert failing(examine(made)) == []
+    forged = respecified(made, lambda s: s["safe_set"].update(x=["-1", "1"]))
+    forged["result"]["safe_set"]["x"] = [-1.0, 1.0]
+    forged["result"]["tube"] |= {"rho": 100.0, "rho_r": 99.9}
+    assert [name for name, _ in failing(examine(sealed(forged)))] == ["refuted: tube_in_safe_set"]
 
 
 @pytest.mark.parametrize(("key", "option"), [(A, "26"), (B, "distance")])

@@ -164,13 +164,13 @@ def _clearances(case: Case) -> Iterator[Claim]:
     place, lower = case.place, case.bound_if_any("lower")
     pairs = zip(case.result.specification.obstacles, case.result.clearance, strict=False)
     for k, (obstacle, own) in enumerate(pairs, start=1):
-        if own.verdict != "certified" or lower is None or own.clearance.below is None:
-            continue
         yield Claim(
             f"W in the plane of {', '.join(obstacle.states)}",
             (*case.over_tube, obstacle.states, own.shape),
             lambda obstacle=obstacle, own=own: clearances.shaped(place, obstacle, own.shape),  # type: ignore[misc]
         )
+        if own.verdict != "certified" or lower is None or own.clearance.below is None:
+            continue
         yield Claim(
             f"clearance from obstacle {k} >= {float(own.clearance.below):.6g}",
             (*case.over_tube, obstacle, own, lower),

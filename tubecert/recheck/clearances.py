@@ -30,8 +30,12 @@ def agrees(obstacles: Sequence[Obstacle], found: Sequence[Cleared]) -> Iterator[
         yield own.decides == obstacle.decides, "clearance.decides is not what the specification says"
         yield own.verdict == "certified" or not own.decides, "an obstacle that decides is not cleared"
         below = own.clearance.below
-        positive = own.verdict != "certified" or (below is not None and below > 0)
-        yield positive, "an obstacle is cleared by nothing"
+        positive = below is not None and below > 0
+        yield positive or own.verdict != "certified", "an obstacle is cleared by nothing"
+        yield (
+            own.verdict == "certified" or not positive,
+            "an obstacle is cleared, and yet it is not certified",
+        )
         yield own.clearance.is_interval, "a clearance is not an interval"
 
 

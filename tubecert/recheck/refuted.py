@@ -9,19 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
-from flint import arb
+from flint import arb, ctx
 
-from tubecert.recheck import metric, uncontrollable
-from tubecert.recheck.balls import Ball, exact, is_indefinite
+from tubecert.recheck import metric, start, uncontrollable
+from tubecert.recheck.balls import Ball, exact, floor, is_indefinite
 from tubecert.recheck.case import Case
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Segment
-from tubecert.recheck.examination import Claim
+from tubecert.recheck.examination import SHARP, Claim
 from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
 from tubecert.recheck.reasons import Reason
-from tubecert.recheck.result import Result
+from tubecert.recheck.result import Result, TubeSection
 from tubecert.recheck.specified.metric import Metric
 from tubecert.recheck.specified.trajectory import AnyPlan
 from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix
@@ -123,15 +123,21 @@ def _leaves(case: Case, at: Fraction | None) -> Outcome:
         return metric.stated(False, "no radius is stated")
     if case.result.specification.coordinates:
         return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
-    rho, s = exact(case.result.tube.rho), case.system
-    family = case.result.specification.trajectory
+    s, own = case.system, _least_radius(case, case.result.tube)
+    rho, family = exact(own), case.result.specification.trajectory
     if isinstance(family, AnyPlan):  # some plan of it is at each face of its box
-        own = case.result.tube.rho
         pairs = [(family.x[name], s.safe_set[name]) for name in s.states]
         return _if(any(low - own < least or high + own > most for (low, high), (least, most) in pairs))
     _, x, _ = _near(case, at).middle()
     ranges = (s.safe_set[name] for name in s.states)
     return _if(any(v + rho > exact(hi) or v - rho < exact(lo) for v, (lo, hi) in zip(x, ranges, strict=True)))
+
+
+def _least_radius(case: Case, tube: TubeSection) -> Fraction:
+    """The radius that is stated, or what any must have if that is less: A/a is at least 1, theory 2.11."""
+    with ctx.workprec(SHARP):
+        distance = Fraction(floor(start.offset(case.place)))
+    return min(tube.rho, tube.epsilon + tube.rho_a + distance)
 
 
 def _near(case: Case, at: Fraction | None) -> Segment:

@@ -109,10 +109,14 @@ def recheck(
 
 
 def _refuted_beside(certificate: Certificate) -> Iterator[str]:
-    """Sections that are called refuted beside what is certified: why they are is not examined."""
-    sections = certificate.result.sections
-    if certificate.result.verdict == "certified" and sections is not None:
-        yield from (f"{key}.verdict" for key, own in sections.by_key.items() if own.verdict == "refuted")
+    """Sections and obstacles that are called refuted beside what is certified: why they are is not examined."""
+    result = certificate.result
+    if result.verdict == "certified" and result.sections is not None:
+        yield from (
+            f"{key}.verdict" for key, own in result.sections.by_key.items() if own.verdict == "refuted"
+        )
+        if any(own.verdict == "refuted" for own in result.clearance):
+            yield "clearance.verdict"
 
 
 def _claims(certificate: Certificate, budget: int) -> Iterator[Claim]:

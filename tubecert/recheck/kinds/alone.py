@@ -14,7 +14,7 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
-from tubecert.recheck.kinds.bounds import all_of, at_least, at_most, margin_at_least
+from tubecert.recheck.kinds.bounds import all_of, at_least, at_most, margin_at_least, no_radius
 from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares
 from tubecert.recheck.metric import stated
 
@@ -144,7 +144,7 @@ def _told(section: AloneSection, setting: Setting) -> Outcome:
     """The margin of a section that is not certified; it has no radius in the long run."""
     below = None if section.margin is None else section.margin.below
     if section.ultimate_radius is not None:
-        return stated(False, "a radius is stated of a tube that is not certified")
+        return no_radius()
     if below is None:
         return stated(True, "")
     own = margin(setting, supremum(setting, setting.n.h))

@@ -73,6 +73,11 @@ def not_shown_to_hold(margins: Iterable[Enclosure]) -> Outcome:
     return stated(holds, "by its margins it holds, and yet it is not certified")
 
 
+def no_radius() -> Outcome:
+    """A radius in the long run is one of what is certified."""
+    return stated(False, "a radius is stated of a tube that is not certified")
+
+
 def words(at: Gains) -> str:
     """Gains, to name a claim by."""
     return f"omega = {float(at.bandwidth):.6g}, Gamma = {float(at.adaptation_rate):.6g}"

@@ -17,7 +17,9 @@ from tubecert.recheck.enclosures import Enclosure, enclosure
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import (
+    all_of,
     margin_at_least,
+    no_radius,
     not_shown_to_hold,
     told,
     ultimate,
@@ -122,21 +124,17 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
         """Every pair with its margin and radius."""
         certified = section.verdict == "certified"
         for k, (name, pair) in enumerate(section.pairs.items()):
-            decides = k == 0
             if name == "asked" and not certified:
                 yield ground.claim(
                     "B: what is told of it",
                     (pair,),
-                    lambda pair=pair: _told(pair, ground),  # type: ignore[misc]
+                    lambda pair=pair: _told(pair, ground.setting),  # type: ignore[misc]
                 )
-                continue
-            yield _pair_claim(pair, recipe, ground, by_recipe=decides and certified)
-            if decides:
-                yield ground.claim(
-                    "B: ultimate radius",
-                    (section, pair),
-                    lambda pair=pair: _agreed(section, pair),  # type: ignore[misc]
-                )
+            else:
+                yield _pair_claim(pair, recipe, ground, by_recipe=k == 0 and certified)
+        radius = section.ultimate_radius
+        if radius is not None:
+            yield ground.claim("B: ultimate radius", (section,), lambda: _agreed(section, radius))
 
 
 # -- reading
@@ -201,14 +199,17 @@ def _own_margin(setting: Setting, at: Gains) -> Ball:
     return _margin(setting, at, own_distance_proof(setting, at)) if at.sensible else arb("nan")
 
 
-def _told(pair: DistancePair, ground: Ground) -> Outcome:
-    """Gains that were asked for and are not certified."""
-    if not ground.silent:
-        return not_shown_to_hold([pair.margin])
-    return told(_own_margin(ground.setting, pair.gains), pair.margin, "the distance")
+def _told(pair: DistancePair, setting: Setting) -> Outcome:
+    """Gains that were asked for and are not certified: their margin is true and not positive."""
+    if pair.ultimate_radius is not None:
+        return no_radius()
+    true = told(_own_margin(setting, pair.gains), pair.margin, "the distance")
+    return all_of((true, not_shown_to_hold([pair.margin])))
 
 
-def _agreed(section: DistanceSection, decisive: DistancePair) -> Outcome:
-    """The radius in the long run that B prints is that of its pair."""
-    own, shown = decisive.ultimate_radius, section.ultimate_radius
-    return stated(shown is None or (own is not None and own <= shown), "it is not that of the pair")
+def _agreed(section: DistanceSection, radius: Fraction) -> Outcome:
+    """The radius in the long run that B prints is that of the pair that the verdict is about."""
+    if section.verdict != "certified":
+        return no_radius()
+    own = next(iter(section.pairs.values())).ultimate_radius
+    return stated(own is not None and own <= radius, "it is not that of the pair")

@@ -17,6 +17,7 @@ from tubecert.recheck.kinds.bounds import (
     all_of,
     at_most,
     margin_at_least,
+    no_radius,
     not_shown_to_hold,
     told,
     ultimate,
@@ -107,7 +108,11 @@ class Rates(Kind[RateSection, Gains]):
         """Constants, margins, radius."""
         if section.pair is not None:
             yield from _of_pair(section, section.pair, recipe, ground)
-        setting, least = ground.setting, section.least_adaptation
+        setting, least, radius = ground.setting, section.least_adaptation, section.ultimate_radius
+        if radius is not None:
+            yield ground.claim(
+                "A: ultimate radius", (section,), lambda: _radius_holds(section, radius, setting)
+            )
         if least is not None:
             name = f"A: (26a)-(26c) at {words(least.gains)}"
             yield ground.claim(name, (least,), lambda: _margins_hold(least, setting))
@@ -154,7 +159,6 @@ def _margins(node: Node) -> Margins:
 def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
     """What is claimed of the gains that the verdict is about."""
     setting, at = ground.setting, pair.gains
-    radius = section.ultimate_radius
     shown = {name: ground.constants[name] for name in DERIVED}
     yield ground.claim("A: derived constants", (at, shown), lambda: _derived_hold(shown, setting, at))
     if section.verdict == "certified":
@@ -162,20 +166,9 @@ def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground:
         yield ground.claim(
             "A: its recipe", (pair, recipe), lambda: stated(recipe == at, "it is for other gains")
         )
-    elif ground.silent:
-        yield ground.claim(
-            "A: its margins without a disturbance", (pair,), lambda: _margins_told(pair, setting)
-        )
     else:
-        yield ground.claim("A: what is told of it", (pair,), lambda: not_shown_to_hold(pair.margins.values()))
-    if radius is not None:
-        yield ground.claim(
-            "A: ultimate radius",
-            (at, radius),
-            lambda: ultimate(
-                radius, setting, at, own_distance_proof(setting, at)
-            ),  # theorem B at the same gains
-        )
+        name = "A: its margins without a disturbance" if ground.silent else "A: what is told of it"
+        yield ground.claim(name, (pair,), lambda: _told(pair, ground))
 
 
 def _margins_hold(pair: RatePair, setting: Setting) -> Outcome:
@@ -184,10 +177,19 @@ def _margins_hold(pair: RatePair, setting: Setting) -> Outcome:
     return all_of(margin_at_least(found[claim], pair.margins[claim], f"({claim})") for claim in found)
 
 
-def _margins_told(pair: RatePair, setting: Setting) -> Outcome:
-    """The margins printed, whatever follows from them."""
-    found = margins_26(setting, pair.gains)
-    return all_of(told(found[claim], pair.margins[claim], f"({claim})") for claim in found)
+def _told(pair: RatePair, ground: Ground) -> Outcome:
+    """The margins printed of what is not certified: each is true, and not all are positive but for a disturbance."""
+    found = margins_26(ground.setting, pair.gains)
+    true = all_of(told(found[claim], pair.margins[claim], f"({claim})") for claim in found)
+    return true if ground.silent else all_of((true, not_shown_to_hold(pair.margins.values())))
+
+
+def _radius_holds(section: RateSection, radius: Fraction, setting: Setting) -> Outcome:
+    """The radius in the long run, by theorem B at the same gains."""
+    if section.pair is None or section.verdict != "certified":
+        return no_radius()
+    at = section.pair.gains
+    return ultimate(radius, setting, at, own_distance_proof(setting, at))
 
 
 def _derived_hold(constants: dict[str, Enclosure], setting: Setting, at: Gains) -> Outcome:
