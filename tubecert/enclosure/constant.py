@@ -13,7 +13,7 @@ _LEAST = 2.0**-900
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Witness:
-    """Where the value proven from below is attained: time in s (if it matters) and state, shape (n,)."""
+    """Where the value proven from below is attained, nearly: time in s (if it matters) and state, shape (n,)."""
 
     t: float | None = None
     x: tuple[float, ...] = ()
