@@ -27,7 +27,7 @@ from tubecert.recheck import boxes, pencils
 from tubecert.recheck.boxes import Field
 from tubecert.recheck.branches import norms_below
 from tubecert.recheck.claims import of_certified
-from tubecert.recheck.constants import _left_inverse_slopes
+from tubecert.recheck.constants import _left_inverse_slopes, largest_push
 from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Boxed, prove
 from tubecert.recheck.lipschitz import LipschitzBelow
@@ -407,3 +407,11 @@ def test_the_left_inverse_of_a_crane_is_known_on_wide_boxes():
     test = norms_below(_left_inverse_slopes(fields), Fraction(1))
     wide, narrow = (float(test.bound([(0.1, 0.1 + size)])) for size in (1e-3, 1e-9))
     assert wide < 1.1 * narrow
+
+
+@pytest.mark.parametrize(("B", "upper"), [(3, 2), (Fraction(6, 10**175), Fraction(1, 10**299))])
+def test_the_largest_push_is_one_of_numbers_of_every_size(B, upper):
+    """Floats lose digits near the smallest of them, and with them a part of the range of mu."""
+    push = largest_push(Fraction(B), Fraction(upper))
+    assert push is not None
+    assert push**2 >= B**2 * upper

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 
-from tubecert.recheck.balls import exact, sharp_norm
+from tubecert.recheck.balls import ceiling, exact, root, sharp_norm
 from tubecert.recheck.blocks import blocks
 from tubecert.recheck.boxes import Test
 from tubecert.recheck.branches import norms_below, slopes_below
@@ -52,7 +52,6 @@ from tubecert.recheck.wind import added_to, least_sum
 _ROUND_UP = 1 + Fraction(
     1, 10**15
 )  # the end of a ball as the float next to it: off by 2^-53 of itself at most
-_COARSE = Fraction(1001, 1000)  # a product of two floats and a root are off by less
 _SOME = 2_000  # before the tube is examined part by part of the plan
 
 
@@ -323,7 +322,7 @@ def largest_push(B: Fraction | None, upper: Fraction | None) -> Fraction | None:
     """smax(Theta B) <= |B| sqrt(A); None where one of them is not bounded."""
     if B is None or upper is None:
         return None
-    return Fraction(float(B) * float(upper) ** 0.5) * _COARSE if upper > 0 else Fraction(0)
+    return Fraction(ceiling(exact(B) * root(exact(upper)))) if upper > 0 else Fraction(0)
 
 
 def contained(place: Place) -> Outcome:
