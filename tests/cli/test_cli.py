@@ -11,6 +11,7 @@ from commands import run
 
 from tubecert import __version__, pipeline
 from tubecert.certificate import digest
+from tubecert.certificate.notes import joined
 from tubecert.certificate.result import Result
 from tubecert.cli.belonging import ForeignError
 from tubecert.errors import SpecError
@@ -116,7 +117,8 @@ def test_every_verdict_has_its_code_and_its_certificate(folder, proven, result, 
     proven["result"] = result
     answer = run("certify", SPEC, *how)
     assert answer.exit_code == code
-    assert json.loads(next(folder.iterdir()).read_text())["result"] == result
+    told = json.loads(next(folder.iterdir()).read_text())
+    assert joined(told["result"], told["notes"]) == result
     assert result["verdict"] in answer.stdout
 
 

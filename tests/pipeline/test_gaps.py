@@ -44,7 +44,7 @@ def test_the_certificate_says_how_closely_and_is_confirmed():
     text = SMALL.replace("tube: {", "tube: {gap: auto, ")
     assert text != SMALL
     document = certified(text, conditions="B")
-    gaps = document["result"]["effort"]["gaps"]
+    gaps = document["notes"]["effort"]["gaps"]
     assert set(gaps) <= set(document["result"]["constants"])
     assert gaps["f"] == 0.2
     assert gaps["h"] <= 0.2
@@ -59,7 +59,7 @@ def test_a_given_gap_wins_over_the_key_and_nothing_else_changes():
     text = SMALL.replace("tube: {", "tube: {gap: auto, ")
     own, plain = (proven(each, conditions="B", by_effect=by) for each, by in ((text, False), (SMALL, None)))
     assert own["result"]["constants"] == plain["result"]["constants"]
-    assert "gaps" not in own["result"]["effort"]
+    assert "gaps" not in own["notes"]["effort"]
 
 
 @pytest.mark.parametrize(

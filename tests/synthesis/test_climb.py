@@ -267,10 +267,10 @@ def test_a_deadline_leaves_the_best_that_was_proven():
     """It cuts the list of metrics that are tried and no proof; without any there is nothing, and that is said."""
     patient = Clock(10**9)
     whole = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, deadline=patient)
-    assert whole.data().cut is None
+    assert whole.data().search.cut is None
     half = Clock((10**9 - patient.left) // 2)
     cut = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, deadline=half)
-    assert cut.data().cut == "deadline"
+    assert cut.data().search.cut == "deadline"
     assert cut.verdict is Verdict.CERTIFIED
     assert {row.rate for row in cut.rows} < {row.rate for row in whole.rows}
     kept = {(row.rate, row.degree): row.adaptation_rate for row in whole.rows}
