@@ -49,9 +49,8 @@ def with_B(rows):
         result["constants"][name]["above"] = 10.0
     result["constants"] = {key: own for key, own in result["constants"].items() if key not in DERIVED}
     for key in ("conditions_26", "distance"):
-        section = result[key]
-        left = {"verdict": "undecided", "shortfalls": [], "curve": []}
-        result[key] = {name: left.get(name) for name in section if name != "margins_around"}
+        left = {"verdict": "undecided", "shortfalls": []}
+        result[key] = {name: left.get(name) for name in result[key]}
     result["proof"] = {"no_adaptation": {}}
     return sealed(document)
 

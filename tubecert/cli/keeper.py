@@ -110,9 +110,8 @@ class Keeper:
         self.will: Will | None = None
         self.said = self.over = self.killed = False
         self.asked: int | None = None  # the signal
-        self.end = self.time = self.alarm = (
-            inf  # when it is killed, when its time is up, when it is interrupted
-        )
+        # when it is killed, when its time is up, when it is interrupted
+        self.end = self.time = self.alarm = inf
 
     def wait(self) -> int:
         """The exit code."""

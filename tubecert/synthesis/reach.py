@@ -6,14 +6,14 @@ In: a model. Out: counts. Untrusted: it only warns.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from tubecert.expression import free_symbols
 from tubecert.model import ControlAffineModel
 
-_STATES, _MOVING = (
-    10,
-    2,
-)  # the largest that was seen to end has nine, and three that move; a chain of ten, one
+# the largest that was seen to end has nine states, of which three move; a chain of ten, one that moves
+_STATES: Final = 10
+_MOVING: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
