@@ -1,0 +1,238 @@
+"""What a certificate of a sampled loop says: records as JSON and back, and the file that holds them.
+
+In: what was proven. Out: canonical JSON, sealed with the hash of `result`; `notes` explain, `run` says how it was made,
+and neither is hashed. Only the specification, the tables, `tube` and `inputs` are claims; all that `recipe` says is
+how the proof was found, and a checker may find another. Trusted: yes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from tubecert.certificate.effective import Effective
+from tubecert.enclosure.interval import Array
+from tubecert.records import FormError, Json, foreign
+from tubecert.verdict import Verdict
+
+FORMAT: Final = "tubecert-sampled-loop/1"
+Hold = Literal["middle", "left", "continuous"]
+Afterwards = Literal["nothing", "rest", "repeat"]
+Interpolation = Literal["hold", "linear", "hermite-simpson"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HexMatrix:
+    """A matrix of floats (p, q) that are exact numbers: written as hexadecimal texts, row by row."""
+
+    value: Array
+
+
+def _hex(matrix: HexMatrix) -> Json:
+    return {
+        "columns": int(matrix.value.shape[1]),
+        "rows": [[float(x).hex() for x in row] for row in matrix.value],
+    }
+
+
+def _unhex(data: Json, path: str) -> HexMatrix:
+    rows = data.get("rows") if isinstance(data, dict) and data.keys() == {"columns", "rows"} else None
+    if not isinstance(rows, list) or not isinstance(width := data["columns"], int):
+        raise FormError(path, "is not a matrix of hexadecimal numbers")
+    try:
+        value = np.array([[float.fromhex(text) for text in row] for row in rows], dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise FormError(path, "is not a matrix of hexadecimal numbers") from None
+    value = value.reshape(len(rows), -1) if rows and width else np.zeros((len(rows), width))
+    if value.shape != (len(rows), width) or not np.isfinite(value).all():
+        raise FormError(path, "is not a matrix of finite numbers")
+    return HexMatrix(value)
+
+
+foreign(HexMatrix, _hex, _unhex)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tables:
+    """The controller: delta = M zeta + N dy, zeta+ = F zeta + G dy, with dy = y - x*(t_k) and zeta(0) = 0.
+
+    Shapes: F (z, z), G (z, n), M (m, z), N (m, n); entries are numbers of single precision. z = 0 with N = 0: none.
+    """
+
+    F: HexMatrix
+    G: HexMatrix
+    M: HexMatrix
+    N: HexMatrix
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nominal:
+    """The matrices of the error equation, any floats: A (n, n), B (n, m), E (n, k) of the disturbance."""
+
+    A: HexMatrix
+    B: HexMatrix
+    E: HexMatrix
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage:
+    """From sample `start` on, up to that of the next stage: |x_i - x*_i| < half_widths, |u_j - u*_j| <= deviations.
+
+    `deviations` are those from the plan's input as the computer holds it; `memory` bounds the controller's state
+    zeta, (z,). Exact numbers.
+    """
+
+    start: int
+    half_widths: Mapping[str, Fraction]
+    deviations: Mapping[str, Fraction]
+    memory: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe:
+    """How the inequalities of the stages are proven; nothing of it is believed.
+
+    `lags` L of the rows; `cuts`, for each of e (n), delta (m), zeta (z) the lags at which the components of eta are
+    cut; `pieces` of a sample and `panels` of a quadrature; `windows` of the plan's time or cells of a family;
+    `parameters`: what they do along the plan is slow (a component of eta) or sudden.
+    """
+
+    lags: int
+    cuts: tuple[tuple[int, ...], ...]
+    pieces: int
+    panels: int
+    windows: int
+    parameters: Literal["slow", "sudden"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanKnots:
+    """The knots that the planner proposed, exact: t (K), x (K, n), u (K, m)."""
+
+    t: tuple[Fraction, ...]
+    x: tuple[tuple[Fraction, ...], ...]
+    u: tuple[tuple[Fraction, ...], ...]
+    interpolation: Interpolation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """The specification: canonical data, its hash, the hash of the file, and what the command line set."""
+
+    effective: Effective
+    effective_hash: str
+    file_hash: str
+    settings: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """For which times the tube is proven: up to `horizon` in s, or for ever (None).
+
+    `hold`: what the plan's input is, of the interval in which it acts; before the first command acts the actuators
+    hold it as well.
+    """
+
+    horizon: Fraction | None
+    afterwards: Afterwards
+    hold: Hold
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputUse:
+    """The plan's input and all that the loop adds stay in `range`, an outer bound; `limits` are those asked for."""
+
+    input: str
+    range: tuple[Fraction, Fraction]
+    limits: tuple[Fraction, Fraction] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cleared:
+    """Obstacle number `index` of the specification: whether the tube keeps away from it."""
+
+    index: int
+    verdict: Verdict
+
+
+Missing = Literal[
+    "no_design",
+    "no_fixed_point",
+    "inputs",
+    "safe_set",
+    "start",
+    "obstacle",
+    "undefined",
+    "wish",
+    "not_proven",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lack:
+    """Why nothing is certified: what kind of thing, where (a state, an input or a mode), and how much of what."""
+
+    kind: Missing
+    where: str = ""
+    needed: float | None = None
+    allowed: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What is proven of a sampled loop; without a controller that proves it, stages and recipe are missing."""
+
+    verdict: Verdict
+    spec: Source
+    claim: Claim
+    planned: PlanKnots | None = None
+    nominal: Nominal | None = None
+    controller: Tables | None = None
+    tube: tuple[Stage, ...] = ()
+    inputs: tuple[InputUse, ...] = ()
+    clearance: tuple[Cleared, ...] = ()
+    recipe: Recipe | None = None
+    lacks: tuple[Lack, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shares:
+    """What fills a half-width or a deviation, as numbers in its unit that add up to it."""
+
+    noise: float
+    holding: float
+    uncertainty: float
+    wind: float
+    start: float
+    remainder: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Notes:
+    """What explains a result and claims nothing: shares of the tube at the start, in the long run and of the inputs.
+
+    `attainable`: the sizes of what the loop would have without remainders. `samples`: points of the plan to draw.
+    """
+
+    start: Mapping[str, Shares] = field(default_factory=dict)
+    long_run: Mapping[str, Shares] = field(default_factory=dict)
+    deviations: Mapping[str, Shares] = field(default_factory=dict)
+    constants: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    samples_t: tuple[float, ...] = ()
+    samples_x: tuple[tuple[float, ...], ...] = ()
+    samples_u: tuple[tuple[float, ...], ...] = ()
+    evaluations: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """A sealed certificate."""
+
+    hash: str
+    result: Result
+    notes: Notes
+    run: Mapping[str, Any]
