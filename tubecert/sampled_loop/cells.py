@@ -1,0 +1,156 @@
+"""Where a plan is: windows of its time, or cells of a family's box, as batches that a tape can run over. Trusted: yes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds
+from tubecert.expression import free_symbols, symbol
+from tubecert.expression.matrix import column, combine, jacobian, multiply
+from tubecert.model import TIME
+from tubecert.sampled_loop.setting import Loop
+from tubecert.trajectory.family import Family
+
+_TIMES: Final = 64  # windows of a period of h, beside a plan that does not share it
+MOST: Final = 4096  # windows that a proof may ask for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """N sets that cover all (x*, u*, t) of a plan: x (N, n), u (N, m), t (N,)."""
+
+    x: Interval
+    u: Interval
+    t: Interval
+
+    def __len__(self) -> int:
+        return len(self.x.lo)
+
+    def at(self, index: Array) -> Cells:
+        """Some of them, or some several times."""
+        return Cells(self.x[index], self.u[index], self.t[index])
+
+
+def cells_of(loop: Loop, count: int) -> Cells:
+    """What covers the plan: `count` windows of its time; of a family about as many cells of its boxes."""
+    plan = loop.plan
+    if isinstance(plan, Family):
+        return _of_family(loop, count)
+    if plan.horizon is None:  # a point
+        nothing = np.zeros(1)
+        return Cells(*plan.enclose(nothing, nothing), Interval(nothing, np.array([np.inf])))
+    ends = fraction_bounds(plan.horizon)[1] * np.linspace(0.0, 1.0, count + 1)
+    ends[-1] = fraction_bounds(plan.horizon)[1]
+    return Cells(*plan.enclose(ends[:-1], ends[1:]), Interval(ends[:-1], ends[1:]))
+
+
+def _of_family(loop: Loop, count: int) -> Cells:
+    """A grid in those variables on which the derivatives of F depend."""
+    zero = np.zeros(1)
+    whole = [side[0] for side in loop.plan.enclose(zero, zero)]
+    lo, hi = (np.concatenate([getattr(side, end) for side in whole]) for end in ("lo", "hi"))
+    names = (*loop.model.states, *loop.model.inputs)
+    u = column([symbol(name) for name in loop.model.inputs])
+    field = combine(1, column(loop.drift), 1, multiply(loop.gained, u))
+    slopes = jacobian([row[0] for row in field], names)
+    bent = free_symbols([e for row in slopes for e in row])
+    split = [i for i, name in enumerate(names) if name in bent and hi[i] > lo[i]]
+    parts = max(1, int(count ** (1 / len(split)) + 1e-9)) if split else 1
+    edges = {i: np.linspace(lo[i], hi[i], parts + 1) for i in split}
+    for i, each in edges.items():
+        each[0], each[-1] = lo[i], hi[i]
+    picks = np.array(list(product(range(parts), repeat=len(split))), dtype=np.intp).reshape(-1, len(split))
+    low, high = np.tile(lo, (len(picks), 1)), np.tile(hi, (len(picks), 1))
+    for place, i in enumerate(split):
+        low[:, i], high[:, i] = edges[i][picks[:, place]], edges[i][picks[:, place] + 1]
+    n = loop.states
+    x, u_cells = Interval(low[:, :n], high[:, :n]), Interval(low[:, n:], high[:, n:])
+    return Cells(x, u_cells, Interval(np.zeros(len(picks)), np.full(len(picks), np.inf)))
+
+
+def in_time(loop: Loop, cells: Cells, *, moves: bool) -> Cells:
+    """The cells with the times at which h is there: their own, or every time, where the claim is for ever.
+
+    `moves`: whether h depends on t. Where nothing else is known of it, t is anything from 0 on.
+    """
+    own = bool(np.isfinite(cells.t.hi).all())
+    if not moves or (own and loop.horizon is not None):
+        return cells
+    if loop.horizon is not None:
+        ends = np.linspace(0.0, fraction_bounds(loop.horizon)[1], _TIMES + 1)
+    elif loop.period is not None:
+        ends = np.linspace(0.0, float(loop.period.hi), _TIMES + 1)
+    else:
+        ends = np.array([0.0, np.inf])
+    k, n = len(ends) - 1, len(cells)
+    found = cells.at(np.repeat(np.arange(n), k))
+    return Cells(found.x, found.u, Interval(np.tile(ends[:-1], n), np.tile(ends[1:], n)))
+
+
+def moves_in_time(loop: Loop) -> bool:
+    """Whether h depends on t."""
+    return loop.model.h is not None and TIME in free_symbols(loop.model.h)
+
+
+def end_of(loop: Loop) -> Cells | None:
+    """Where a finite plan ends, if it rests there for ever after."""
+    if loop.afterwards != "rest" or loop.plan.horizon is None:
+        return None
+    low, high = fraction_bounds(loop.plan.horizon)
+    lo, hi = np.array([low]), np.array([high])
+    return Cells(*loop.plan.enclose(lo, hi), Interval(lo, hi))
+
+
+def steepness(loop: Loop, count: int) -> Array | None:
+    """sup |u*'_j| along the plan, (m,); None if u* jumps."""
+    plan = loop.plan
+    bundle = loop.spec.trajectory.bundle
+    if bundle is not None:
+        rate = bundle.input_rate
+        return None if rate is None else np.array([fraction_bounds(each)[1] for each in rate])
+    if plan.horizon is None or plan.is_constant:
+        return np.zeros(loop.inputs)
+    return _along(loop, count)
+
+
+def _along(loop: Loop, count: int) -> Array | None:
+    from tubecert.enclosure.tape import Tape
+    from tubecert.expression import derivatives
+    from tubecert.trajectory.pieces import PiecewisePlan
+
+    plan = loop.plan
+    if isinstance(plan, PiecewisePlan):
+        if plan.data.interpolation == "hold":
+            return None
+        u, length = plan.pieces.u, plan.pieces.length
+        slope = u[:, :, 1]
+        if u.lo.shape[2] > 2:
+            reach = Interval(np.zeros_like(length.hi), length.hi)[:, None]
+            slope = slope + 2 * (reach * u[:, :, 2])
+        return np.asarray(slope.sanitised().magnitude.max(axis=0))
+    ends = cells_of(loop, count).t
+    tape = Tape(derivatives(plan.u, TIME), (TIME,))
+    return np.asarray(tape.run([ends], ends.lo.shape).magnitude.max(axis=1))
+
+
+def largest_jump(loop: Loop) -> Array:
+    """What u* held between knots differs by, at most, within one sample that does not begin at a knot; (m,).
+
+    Nothing, if every knot is an instant at which commands begin to act.
+    """
+    knots = loop.plan.knots
+    assert knots is not None
+    inner = knots.t[1:-1] if loop.afterwards != "repeat" else knots.t[1:]
+    if all(((t - loop.rest) / loop.sample_time).denominator == 1 for t in inner):
+        return np.zeros(loop.inputs)
+    closest = min(b - a for a, b in zip(knots.t, knots.t[1:], strict=False))
+    met = int(loop.sample_time / closest) + 1
+    rows = knots.u[: len(knots.t) - 1]
+    follows = [*rows[1:], rows[0]]
+    sizes = [max(abs(b[j] - a[j]) for a, b in zip(rows, follows, strict=True)) for j in range(loop.inputs)]
+    return np.array([fraction_bounds(met * Fraction(size))[1] for size in sizes])

@@ -1,0 +1,280 @@
+"""A specification and the matrices of an error equation -> the loop that the theorem is about.
+
+Everything is exact: times are rational, matrices are floats that anybody may propose. Trusted: yes.
+Implements: theory of the sampled loop, section 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from math import ceil
+from typing import Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds
+from tubecert.enclosure.tape import Tape
+from tubecert.expression import Expression, constant, free_symbols
+from tubecert.model import TIME, ControlAffineModel, time_period
+from tubecert.sampled_loop.midrad import Known
+from tubecert.sampled_loop.record import Afterwards, Hold, PlanKnots, Tables
+from tubecert.spec import Spec
+from tubecert.spec.types import Hardware, Vector
+from tubecert.trajectory.plan import Plan
+
+ROUNDING: Final = {"single": 2.0**-24, "double": 2.0**-53}
+PLAN_ROUNDING: Final = 2.0**-24
+"""The controller's x* and u* are off by at most this of their largest size along the plan."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Size:
+    """What bounds a signal: every component, shape (k,), or its length (then each entry of `each` is the length)."""
+
+    each: Array
+    length: bool
+
+    @classmethod
+    def of(cls, bound: Fraction | Vector, components: int) -> Size:
+        """A number bounds the length, a list the components."""
+        if isinstance(bound, tuple):
+            return cls(np.array([fraction_bounds(each)[1] for each in bound]), length=False)
+        return cls(np.full(components, fraction_bounds(bound)[1]), length=components > 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """x(0) - x*(0): a known vector (n,) and what may be added to it, within a box (n,) or a length."""
+
+    known: Known
+    box: Array
+    length: float
+
+    @property
+    def reach(self) -> Array:
+        """sup |x_i(0) - x*_i(0)|, (n,)."""
+        return np.asarray((self.known.above[:, 0] + self.box + self.length) * (1 + 1e-15))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Loop:
+    """The sampled loop about its plan; A (n, n), B (n, m), E (n, k) are any floats.
+
+    `slow`: what unknown parameters do along the plan is a component of eta, else it is sudden.
+    """
+
+    spec: Spec
+    model: ControlAffineModel
+    plan: Plan
+    knots: PlanKnots | None
+    A: Array
+    B: Array
+    E: Array
+    slow: bool
+
+    # sizes
+
+    @property
+    def states(self) -> int:
+        """n."""
+        return len(self.model.states)
+
+    @property
+    def inputs(self) -> int:
+        """m."""
+        return len(self.model.inputs)
+
+    # the machine
+
+    @property
+    def hardware(self) -> Hardware:
+        """The computer and the sensors."""
+        assert self.spec.hardware is not None
+        return self.spec.hardware
+
+    @property
+    def sample_time(self) -> Fraction:
+        """Ts in s."""
+        return self.hardware.sample_time
+
+    @cached_property
+    def delay(self) -> Fraction:
+        """tau in s."""
+        return self.sample_time if self.hardware.delay is None else self.hardware.delay
+
+    @property
+    def whole(self) -> int:
+        """q: whole samples of the delay."""
+        return int(self.delay // self.sample_time)
+
+    @property
+    def rest(self) -> Fraction:
+        """tau': the rest of the delay, in [0, Ts)."""
+        return self.delay - self.whole * self.sample_time
+
+    @property
+    def hold(self) -> Hold:
+        """What the plan's input is while a command acts."""
+        return self.hardware.hold
+
+    @property
+    def unit(self) -> float:
+        """The unit of rounding of the controller."""
+        return ROUNDING[self.hardware.arithmetic]
+
+    @property
+    def noise(self) -> Size:
+        """Of the measured states."""
+        return Size.of(self.hardware.noise, self.states)
+
+    # what pushes
+
+    @cached_property
+    def gusts(self) -> Size:
+        """Of the disturbance w, (k,)."""
+        wind = self.spec.disturbance
+        return Size(np.zeros(0), length=False) if wind is None else Size.of(wind.bound, self.E.shape[1])
+
+    @property
+    def sways(self) -> bool:
+        """Whether the disturbance has a rate: then it is a component of eta."""
+        return self.spec.disturbance is not None and self.spec.disturbance.rate is not None
+
+    @cached_property
+    def matched(self) -> tuple[int, ...]:
+        """The inputs beside which an h acts that is not identically 0."""
+        h = self.model.h
+        return tuple(j for j in range(self.inputs) if h is None or h[j] != constant(0))
+
+    @cached_property
+    def jumps(self) -> bool:
+        """Whether nothing bounds how fast h changes: it is sudden, as a wind through the columns of B."""
+        bounds = self.spec.uncertainty.bounds
+        return self.model.h is None and (bounds is None or bounds.h_x is None or bounds.h_t is None)
+
+    @cached_property
+    def unknown(self) -> tuple[int, ...]:
+        """The rows of F in which a parameter stands that is not known."""
+        names = {name for name, _ in self.model.parameters}
+        rows = zip(self.drift, self.gained, strict=True)
+        return tuple(i for i, (f, row) in enumerate(rows) if names & set(free_symbols([f, *row])))
+
+    @property
+    def drift(self) -> tuple[Expression, ...]:
+        """f(x, p), (n,)."""
+        return self.model.drift or self.model.f
+
+    @property
+    def gained(self) -> tuple[tuple[Expression, ...], ...]:
+        """B(x, p), (n, m)."""
+        return tuple(map(tuple, self.model.gained or self.model.B))
+
+    @cached_property
+    def H(self) -> Array:
+        """How eta enters, (n, r): h by the columns of B, a disturbance with a rate by those of E, parameters by rows."""
+        own = self.B[:, [] if self.jumps else list(self.matched)]
+        swaying = self.E if self.sways else self.E[:, :0]
+        rows = self.unknown if self.slow else ()
+        return np.hstack([own, swaying, np.eye(self.states)[:, list(rows)]])
+
+    @cached_property
+    def sudden(self) -> tuple[tuple[Array, Size], ...]:
+        """Blocks of what may jump at any time: columns (n, k) and its size."""
+        blocks = []
+        if self.gusts.each.size and not self.sways:
+            blocks.append((self.E, self.gusts))
+        if self.jumps and self.matched:
+            bounds = self.spec.uncertainty.bounds
+            assert bounds is not None
+            assert bounds.h is not None
+            blocks.append((self.B, Size.of(bounds.h, self.inputs)))
+        return tuple(blocks)
+
+    # the plan in time
+
+    @cached_property
+    def horizon(self) -> Fraction | None:
+        """Until when the claim is, in s; None: for ever."""
+        end = self.plan.horizon
+        return None if end is None or self.afterwards != "nothing" else end
+
+    @property
+    def afterwards(self) -> Afterwards:
+        """What holds after the end of a finite plan."""
+        return self.spec.trajectory.afterwards
+
+    @cached_property
+    def samples(self) -> int | None:
+        """Intervals up to the horizon, None for ever."""
+        return None if self.horizon is None else ceil(self.horizon / self.sample_time)
+
+    @cached_property
+    def period(self) -> Interval | None:
+        """A common period in t of h, an enclosure; None if there is none to be seen."""
+        return time_period(self.model.h or ())
+
+    def goes_on(self) -> bool:
+        """Whether the plan is known for all times of the claim: `repeat` needs a plan that repeats.
+
+        Formulas go on as they are, with a period that is not longer than the horizon; knots begin again, which needs
+        equal ends and a horizon of whole samples.
+        """
+        end = self.plan.horizon
+        if self.afterwards != "repeat" or end is None:
+            return True
+        if (knots := self.plan.knots) is not None:
+            whole = (end / self.sample_time).denominator == 1 and knots.t[-1] == end
+            return whole and knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
+        period = time_period([*self.plan.x, *self.plan.u])
+        return period is not None and bool(period.hi <= fraction_bounds(end)[0])
+
+    @cached_property
+    def start(self) -> Start:
+        """x(0) - x*(0)."""
+        n, spec = self.states, self.spec
+        nothing = np.zeros(n)
+        if spec.within is not None:
+            return Start(Known.exact(np.zeros((n, 1))), nothing, fraction_bounds(spec.within)[1])
+        planned = Tape(self.plan.start, ()).run([], ())
+        middle, box = Interval.of(0), nothing
+        ends = spec.start_box or tuple((x, x) for x in spec.x0)
+        bounds = np.array([(*fraction_bounds((a + b) / 2), fraction_bounds((b - a) / 2)[1]) for a, b in ends])
+        middle, box = Interval(bounds[:, 0], bounds[:, 1]), bounds[:, 2]
+        return Start(Known.of((middle - planned).sanitised()[:, None]), box, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Controller:
+    """The tables as arrays: F (z, z), G (z, n), M (m, z), N (m, n)."""
+
+    F: Array
+    G: Array
+    M: Array
+    N: Array
+
+    @classmethod
+    def of(cls, tables: Tables) -> Controller:
+        """The tables of a record."""
+        return cls(tables.F.value, tables.G.value, tables.M.value, tables.N.value)
+
+    @property
+    def size(self) -> int:
+        """z, the entries of its state."""
+        return len(self.F)
+
+    def fits(self, loop: Loop) -> bool:
+        """Whether the shapes agree and every entry is a number of single precision."""
+        z, n, m = self.size, loop.states, loop.inputs
+        shapes = ((self.F, (z, z)), (self.G, (z, n)), (self.M, (m, z)), (self.N, (m, n)))
+        with np.errstate(all="ignore"):
+            return all(
+                own.shape == shape and bool((own.astype(np.float32).astype(float) == own).all())
+                for own, shape in shapes
+            )
+
+
+def depends_on_time(expressions: tuple[Expression, ...]) -> bool:
+    """Whether t occurs."""
+    return TIME in free_symbols(expressions)

@@ -1,0 +1,371 @@
+"""The inequalities of the sampled loop, and the one place where its tube becomes certified.
+
+For every output o = c xi + direct terms and every sample k, b_o(k) bounds |o| if every earlier error was inside the
+tube; (a) b of e_i < W_i on all of every sample, (b) b of delta_j <= U_j, (c) b of zeta <= Z. Then no first exit is
+possible (theory of the sampled loop, theorem 5). Who proposed tables, tube and recipe does not matter. Trusted: yes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.enclosure.interval import Array, fraction_bounds
+from tubecert.enclosure.outward import number_above, number_below
+from tubecert.enclosure.processor import require_ieee
+from tubecert.records import exact_json
+from tubecert.sampled_loop.cells import MOST
+from tubecert.sampled_loop.midrad import SUMMED, UNIT, total
+from tubecert.sampled_loop.obstacles import cleared
+from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage
+from tubecert.sampled_loop.remainders import Amplitudes, Remainders
+from tubecert.sampled_loop.responses import Responses, weighed
+from tubecert.sampled_loop.setting import PLAN_ROUNDING, Controller, Loop
+from tubecert.trajectory.family import Family
+from tubecert.verdict import Verdict
+
+MOST_LAGS: Final = 50_000
+MOST_PARTS: Final = 64
+_FLUSHED: Final = 1e-35  # what a computer may lose that has no subnormal numbers, z + n <= 400 products and sums
+_INDEX = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Boxes:
+    """What is claimed, or what follows, stage by stage: W (g, n) of e, U (g, m) of delta, Z (g, z) of zeta."""
+
+    W: Array
+    U: Array
+    Z: Array
+
+    @classmethod
+    def of(cls, stages: Sequence[Stage], names: tuple[Sequence[str], Sequence[str]], *, above: bool) -> Boxes:
+        """Of stages, as floats from above or from below."""
+        end = 1 if above else 0
+
+        def floats(values: Sequence[Fraction]) -> list[float]:
+            return [fraction_bounds(value)[end] for value in values]
+
+        states, inputs = names
+        return cls(
+            np.array([floats([own.half_widths[name] for name in states]) for own in stages]),
+            np.array([floats([own.deviations[name] for name in inputs]) for own in stages]),
+            np.array([floats(own.memory) for own in stages]).reshape(len(stages), -1),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Phase:
+    """Samples from `start` on with one stage and the same commands acting; `rho` and `xi` are those of its tube."""
+
+    start: int
+    stage: int
+    U: Array
+    rho: Array
+    core: Array
+    eta: Array
+
+
+class Inequalities:
+    """All b_o(k) of one loop, controller and recipe, for any tube: it is monotone in the tube."""
+
+    def __init__(
+        self, loop: Loop, controller: Controller, recipe: Recipe, starts: Sequence[int], responses: Responses
+    ) -> None:
+        self.loop, self.controller, self.recipe, self.starts = loop, controller, recipe, tuple(starts)
+        self.responses = responses
+        self.remainders = Remainders(loop, recipe.windows)
+        n, m, z = loop.states, loop.inputs, controller.size
+        self._outputs = np.concatenate(
+            [np.tile(np.arange(n), len(responses.nodes)), np.arange(n, n + m + z)]
+        )  # which of e, delta, zeta a row is about
+        cuts = np.array(recipe.cuts, dtype=np.intp).reshape(n + m + z, -1)
+        self._cuts = cuts[self._outputs]  # (rows, r)
+
+    @cached_property
+    def last(self) -> int:
+        """The last sample whose inequality is written down; that of a later one is the same."""
+        whole = self.starts[-1] + self.loop.whole + 1 + self.recipe.lags
+        return whole if self.loop.samples is None else min(whole, self.loop.samples - 1)
+
+    def of(self, boxes: Boxes) -> Boxes:
+        """The bounds that follow where the loop has kept to these boxes so far."""
+        b, direct, spread = self._all(boxes)
+        n, m = self.loop.states, self.loop.inputs
+        nodes = len(self.responses.nodes)
+        e = b[:, : n * nodes].reshape(len(b), nodes, n)
+        between = [
+            np.maximum(e[:, own.first], e[:, own.first + 1]) + spread[:, place] + direct[:, own.first + 1]
+            for place, own in enumerate(self.responses.pieces)
+        ]
+        within = np.max(between, axis=0) * (1 + 4 * UNIT)
+        rest = b[:, n * nodes :]
+        ends = [*self.starts[1:], self.last + 1]
+        most = [
+            [np.max(own[k:end], axis=0, initial=0.0) for k, end in zip(self.starts, ends, strict=True)]
+            for own in (within, rest[:, :m], rest[:, m:])
+        ]
+        return Boxes(*map(np.array, most))
+
+    # -- the terms ---------------------------------------------------------------------------------------------------
+
+    def phases(self, boxes: Boxes) -> tuple[list[_Phase], Amplitudes]:
+        """The parts of time in which the same stage lasts and commands of the same stages act."""
+        q = self.loop.whole
+        starts = sorted({0, *self.starts, *(k + q + 1 for k in self.starts[1:])})
+        ends = [*starts[1:], starts[-1] + 1]
+        of = np.searchsorted(self.starts, np.arange(starts[-1] + 2), side="right") - 1
+        whole = boxes.W.max(axis=0)
+        found = []
+        for start, end in zip(starts, ends, strict=True):
+            acting = boxes.U[of[max(0, start - q - 1)] : of[end - 1] + 1].max(axis=0)
+            stage = int(of[start])
+            own = self.remainders.on(boxes.W[stage], acting, whole)
+            core = np.concatenate([boxes.W[stage], boxes.Z[stage], np.tile(acting, q + 1)])
+            found.append(_Phase(start, stage, acting, own.rho, core, own.size))
+        return found, own
+
+    def _rounding(self, boxes: Boxes) -> Array:
+        """r_y (n,), r_u (m,), r_z (z,): what the controller's own arithmetic is off by, of every stage (G9)."""
+        loop, c, u = self.loop, self.controller, self.loop.unit
+        n, z = loop.states, c.size
+        k = z + n + 3
+        gamma = k * u / (1 - k * u) * (1 + 1e-15)
+        W, Z = boxes.W.max(axis=0), boxes.Z.max(axis=0)
+        above, noise = self.remainders.states_above, loop.noise.each
+        y = PLAN_ROUNDING * above + 2 * u * (2 * above + W + noise) + _FLUSHED
+        seen = (W + noise + y) * SUMMED
+        planned = self.remainders.inputs_above + self.remainders.held
+        delta = gamma * (planned + total(np.abs(c.M), Z) + total(np.abs(c.N), seen)) + _FLUSHED
+        state = gamma * (total(np.abs(c.F), Z) + total(np.abs(c.G), seen)) + _FLUSHED
+        return np.concatenate([y, delta, state]) * SUMMED
+
+    def _all(self, boxes: Boxes) -> tuple[Array, Array, Array]:
+        """b of every row (K, R); direct terms at every node (K, nodes, n); what pieces add (K, pieces, n)."""
+        own, loop = self.responses, self.loop
+        phases, sizes = self.phases(boxes)
+        off = self._rounding(boxes)
+        k = np.arange(self.last + 1)
+        lag = np.minimum(k, own.lags)
+        now = weighed(own.noise_now, loop.noise) + total(own.noise_now, off[: loop.states])
+        now += total(own.rounding_now, off[loop.states : loop.states + loop.inputs])
+        most_core = np.max([phase.core for phase in phases], axis=0)
+        now += total(own.missed_core, np.maximum(most_core, self._begins)) + total(own.missed_eta, sizes.size)
+        constant = own.noise + own.wind + total(own.rounding, off)
+        b = now + constant[lag] + self._slow(sizes, lag, k) + self._first(k) + self._tail(phases, k)
+        starts = [*(phase.start for phase in phases[1:]), self.last + 2]
+        slack = 8 * (own.lags + 8) * UNIT  # a difference of two sums from above
+        for phase, end in zip(phases, starts, strict=True):
+            answers = total(own.rho, phase.rho)
+            newer, older = np.clip(k - phase.start, 0, lag), np.clip(k - end, 0, lag)
+            b += answers[newer] - answers[older] + slack * answers[newer]
+        index = np.searchsorted([phase.start for phase in phases], k, side="right") - 1
+        direct = np.array([self._within(phase, sizes) for phase in phases])[index]
+        spread = np.array([self._between(phase, off) for phase in phases])[index]
+        return b * SUMMED, direct, spread
+
+    @property
+    def _begins(self) -> Array:
+        """The box of xi(0) without eta: zeta and what has been sent are 0 at boot."""
+        nothing = np.zeros(self.responses.dynamics.core_size - self.loop.states)
+        return np.concatenate([self.loop.start.reach, nothing])
+
+    def _slow(self, sizes: Amplitudes, lag: _INDEX, k: _INDEX) -> Array:
+        """eta by its rate up to the cut, and by its size from there on (D-cut), (K, R)."""
+        own = self.responses
+        found = np.zeros((len(k), len(self._outputs)))
+        rows = np.arange(found.shape[1])
+        for c, (size, rate, first) in enumerate(zip(sizes.size, sizes.rate, sizes.first, strict=True)):
+            cut = self._cuts[:, c]
+            upto = np.minimum(lag[:, None], cut)
+            found += rate * own.rate[upto, rows, c]
+            begins = (k[:, None] <= cut) & (k[:, None] <= own.lags)
+            found += np.where(begins, first, size) * np.abs(own.eta[upto, rows, c])
+            older = own.size[lag[:, None], rows, c]
+            found += size * (older - own.size[upto, rows, c] + 8 * (own.lags + 8) * UNIT * older)
+        return found
+
+    def _first(self, k: _INDEX) -> Array:
+        """sup |r_k xi_0| of the start, for k <= L; afterwards nothing."""
+        own, start, n = self.responses, self.loop.start, self.loop.states
+        early = own.rows[: min(len(k), own.lags + 1), :, :n]
+        known = np.abs(early @ start.known.mid[:, 0])
+        size = np.abs(early)
+        known += size @ (start.known.rad[:, 0] + start.box) + 64 * UNIT * (size @ start.known.above[:, 0])
+        if start.length:
+            known += np.sqrt(np.sum(size * size, axis=-1)) * start.length
+        found = np.zeros((len(k), own.count))
+        found[: len(early)] = known * SUMMED
+        return found
+
+    def _tail(self, phases: Sequence[_Phase], k: _INDEX) -> Array:
+        """|r_L| Xi of the sample L before, for k > L; eta stands with its cut."""
+        own = self.responses
+        found = np.zeros((len(k), own.count))
+        late = k > own.lags
+        boxes = np.array([total(np.abs(own.rows[-1]), phase.core) for phase in phases])
+        index = np.searchsorted([phase.start for phase in phases], k[late] - own.lags, side="right") - 1
+        found[late] = boxes[index]
+        return found
+
+    def _within(self, phase: _Phase, sizes: Amplitudes) -> Array:
+        """What acts within the sample itself, up to every node, (nodes, n)."""
+        return np.array(
+            [
+                (own.wind + total(own.rho, phase.rho) + total(own.rate, sizes.rate)) * SUMMED
+                for own in self.responses.direct
+            ]
+        )
+
+    def _between(self, phase: _Phase, off: Array) -> Array:
+        """How far e may be from the chord between two nodes, (pieces, n)."""
+        n, m = self.loop.states, self.loop.inputs
+        return np.array(
+            [
+                (
+                    total(own.core, phase.core)
+                    + total(own.eta, phase.eta)
+                    + weighed(own.noise, self.loop.noise)
+                    + total(own.noise, off[:n])
+                    + total(own.rounding, off[n : n + m])
+                )
+                * SUMMED
+                for own in self.responses.pieces
+            ]
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checked:
+    """The verdict on stages and a recipe, with what else is proven or missing."""
+
+    verdict: Verdict
+    inputs: tuple[InputUse, ...] = ()
+    clearance: tuple[Cleared, ...] = ()
+    lacks: tuple[Lack, ...] = ()
+
+
+def check(
+    loop: Loop,
+    controller: Controller,
+    stages: Sequence[Stage],
+    recipe: Recipe,
+    inequalities: Inequalities | None = None,
+) -> Checked:
+    """Whether the loop keeps to the stages, for everything that the specification lets happen.
+
+    `inequalities` of this loop, controller and recipe may be handed in by whoever has them already.
+    """
+    require_ieee()
+    if not _sound(loop, controller, stages, recipe):
+        return Checked(verdict=Verdict.UNDECIDED, lacks=(Lack(kind="not_proven"),))
+    starts = [own.start for own in stages]
+    if inequalities is None:
+        made = Responses(loop, controller, lags=recipe.lags, pieces=recipe.pieces, panels=recipe.panels)
+        inequalities = Inequalities(loop, controller, recipe, starts, made)
+    names = loop.model.states, loop.model.inputs
+    above = Boxes.of(stages, names, above=True)
+    below = Boxes.of(stages, names, above=False)
+    with np.errstate(all="ignore"):  # what is not finite bounds nothing
+        found = inequalities.of(above)
+    lacks = [*_short(loop, found, below), *_domain(loop, inequalities, above), *_wishes(loop, stages)]
+    if isinstance(loop.slow, bool) and loop.slow and loop.unknown and not inequalities.remainders.smooth:
+        lacks.append(Lack(kind="not_proven"))
+    inputs, over = _inputs(loop, inequalities.remainders, above)
+    clearance = cleared(loop, above.W, starts)
+    blocked = [
+        Lack(kind="obstacle", where=str(own.index + 1))
+        for own in clearance
+        if own.verdict is not Verdict.CERTIFIED and loop.spec.obstacles[own.index].decides
+    ]
+    lacks += [*over, *blocked]
+    verdict = Verdict.UNDECIDED if lacks else Verdict.CERTIFIED
+    return Checked(verdict=verdict, inputs=inputs, clearance=clearance, lacks=tuple(lacks))
+
+
+def _sound(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: Recipe) -> bool:
+    """Whether everything has the form that the theorem asks for."""
+    n, m, z, r = loop.states, loop.inputs, controller.size, loop.H.shape[1]
+    starts = [own.start for own in stages]
+    return (
+        controller.fits(loop)
+        and loop.slow == (recipe.parameters == "slow")
+        and loop.goes_on()
+        and not (isinstance(loop.plan, Family) and loop.afterwards != "nothing")
+        and 1 <= recipe.lags <= MOST_LAGS
+        and 1 <= recipe.windows <= MOST
+        and 1 <= recipe.pieces <= MOST_PARTS
+        and 1 <= recipe.panels <= MOST_PARTS
+        and starts[:1] == [0]
+        and all(a < b for a, b in zip(starts, starts[1:], strict=False))
+        and (loop.samples is None or starts[-1] < loop.samples)
+        and all(len(own.memory) == z for own in stages)
+        and len(recipe.cuts) == n + m + z
+        and all(len(own) == r and all(0 <= cut <= recipe.lags for cut in own) for own in recipe.cuts)
+        and all(np.isfinite(own).all() for own in (loop.A, loop.B, loop.E))
+    )
+
+
+def _short(loop: Loop, found: Boxes, claimed: Boxes) -> list[Lack]:
+    """(a), (b), (c): strict for the error, which is what a first exit is about."""
+    holds = bool((found.W < claimed.W).all() and (found.U <= claimed.U).all() and (found.Z <= claimed.Z).all())
+    if holds:
+        return []
+    short = np.max(np.where(found.W < claimed.W, 0.0, 1.0), axis=0)
+    where = loop.model.states[int(np.argmax(short))] if short.any() else ""
+    return [Lack(kind="no_fixed_point", where=where)]
+
+
+def _domain(loop: Loop, inequalities: Inequalities, boxes: Boxes) -> list[Lack]:
+    """(d): the tube lies in the safe set, on which everything is defined."""
+    W = boxes.W.max(axis=0)
+    cells = inequalities.remainders.cells
+    lacks = []
+    for i, (name, (low, high)) in enumerate(zip(loop.model.states, loop.spec.safe_set, strict=True)):
+        least, most = number_below(cells.x.lo[:, i].min() - W[i]), number_above(cells.x.hi[:, i].max() + W[i])
+        if not (least >= fraction_bounds(low)[1] and most <= fraction_bounds(high)[0]):
+            over = max(least - float(high), float(low) - least, most - float(high))
+            lacks.append(Lack(kind="safe_set", where=name, needed=float(over) if np.isfinite(over) else None))
+    return lacks
+
+
+def _wishes(loop: Loop, stages: Sequence[Stage]) -> list[Lack]:
+    """Half-widths that were asked for, of states and outputs, and are not met."""
+    rows = dict(zip(loop.model.states, np.eye(loop.states, dtype=int).tolist(), strict=True))
+    rows |= {output.name: list(output.row) for output in loop.spec.outputs}
+    lacks = []
+    for name, wish in loop.spec.tube.half_widths:
+        widths = [
+            sum(abs(factor) * own.half_widths[state] for factor, state in zip(rows[name], loop.model.states, strict=True))
+            for own in stages
+        ]
+        if (most := max(widths)) > wish:
+            lacks.append(Lack(kind="wish", where=name, needed=float(most), allowed=float(wish)))
+    return lacks
+
+
+def _inputs(loop: Loop, remainders: Remainders, boxes: Boxes) -> tuple[tuple[InputUse, ...], list[Lack]]:
+    """What every input takes, and which of them leaves its limits."""
+    limits = dict(loop.spec.limits)
+    low, high = remainders.inputs_range
+    U = boxes.U.max(axis=0) + PLAN_ROUNDING * remainders.inputs_above
+    uses, lacks = [], []
+    for j, name in enumerate(loop.model.inputs):
+        ends = _outward(number_below(low[j] - number_above(U[j])), number_above(high[j] + number_above(U[j])))
+        given = limits.get(name)
+        uses.append(InputUse(input=name, range=ends, limits=given))
+        if given is not None and not (given[0] <= ends[0] and ends[1] <= given[1]):
+            room = min(float(high[j] * 0 + given[1]) - float(high[j]), float(low[j]) - float(given[0]))
+            lacks.append(Lack(kind="inputs", where=name, needed=float(U[j]), allowed=room))
+    return tuple(uses), lacks
+
+
+def _outward(low: float, high: float) -> tuple[Fraction, Fraction]:
+    """Decimals beside two floats, as a certificate writes them."""
+    return Fraction(exact_json(Fraction(repr(low)))), Fraction(exact_json(Fraction(repr(high))))
