@@ -112,7 +112,7 @@ def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
 
 def _wind(wind: Disturbance) -> Blowing:
     return Blowing(
-        bound=number_text(wind.bound),
+        bound=number_text(wind.length),
         rate=None if wind.rate is None else number_text(wind.rate),
     )
 
@@ -236,7 +236,7 @@ def assumptions(
         UncertaintyAsDeclared()
         if spec.uncertainty.h is None
         else UncertaintyAsGiven(any_within_bounds=_any_start(spec)),
-        *(() if wind is None else (WindWithin(bound=wind.bound, rate=wind.rate),)),
+        *(() if wind is None else (WindWithin(bound=wind.length, rate=wind.rate),)),
         *(() if not spec.ranges else (ParametersWithin(),)),
         *(() if spec.hardware is None else (HardwareLeftOut(),)),
     )

@@ -51,7 +51,7 @@ class ControlAffineModel:
     """xdot = f(x) + B(x)(u + h(t, x)) + E(x) w with dual metric W at a rate, all exact.
 
     Shapes: f (n,), B (n, m), W (n, n), h (m,). Derived matrices are built when asked for and shared. E (n, k) is empty
-    where there is no wind; |w| <= `wind_bound`, and |w'| <= `wind_rate` where that is known. Where
+    where there is no wind; |w| <= `wind_bound` if that is one number, and |w'| <= `wind_rate` if that is known. Where
     `parameters` lie in ranges, the plant has `drift`, f(x, theta) (n,), in place of f, which the controller knows, and
     `gained`, B(x, theta) (n, m), in place of B, if that is not empty. `time`: the range of t in f(t, x), None if f is
     free of t. `outputs`: linear combinations of the states whose half-widths are told.
@@ -199,7 +199,7 @@ def build(spec: Spec) -> ControlAffineModel:
         rate=metric.rate if metric else Fraction(0),
         h=None if h is None else tuple(term.expression for term in h),
         E=() if wind is None else tuple(tuple(term.expression for term in row) for row in wind.E),
-        wind_bound=None if wind is None else wind.bound,
+        wind_bound=wind.bound if wind is not None and isinstance(wind.bound, Fraction) else None,
         wind_rate=None if wind is None else wind.rate,
         drift=tuple(term.expression for term in spec.drift),
         gained=tuple(tuple(term.expression for term in row) for row in spec.gained),

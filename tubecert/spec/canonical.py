@@ -58,16 +58,20 @@ def canonical(spec: Spec) -> dict[str, Any]:
         data["simulation"] = _simulation(spec.simulation)
     if spec.hardware is not None:
         data["hardware"] = _hardware(spec, spec.hardware)
+        data["controller"] = spec.controller
     if (wind := spec.disturbance) is not None:
         data["disturbance"] = {
             "E": [_texts(row) for row in wind.E],
-            **_given(bound=wind.bound, rate=wind.rate),
+            "bound": _numbers(wind.bound) if isinstance(wind.bound, tuple) else number_text(wind.bound),
+            **_given(rate=wind.rate),
         }
     return data
 
 
 def _loop(spec: Spec) -> dict[str, Any]:
     """What every certificate is about, beside a system and its metric."""
+    if spec.hardware is not None:
+        return _sampled_loop(spec)
     return {
         "uncertainty": _uncertainty(spec),
         "trajectory": _trajectory(spec),
@@ -78,6 +82,18 @@ def _loop(spec: Spec) -> dict[str, Any]:
             "projection": "hard" if spec.adaptation.smooth is None else _given(smooth=spec.adaptation.smooth),
         },
         "conditions": {} if spec.decides is None else {"decides": spec.decides},
+    }
+
+
+def _sampled_loop(spec: Spec) -> dict[str, Any]:
+    """The same of a loop that a computer closes: nothing of a metric, and what holds after the plan."""
+    plan, wishes = spec.trajectory, spec.tube.half_widths
+    after = {} if plan.horizon is None else {"afterwards": plan.afterwards}
+    return {
+        "uncertainty": _uncertainty(spec),
+        "trajectory": _trajectory(spec) | after,
+        "initial_state": _initial_state(spec),
+        "tube": {"half_widths": _given(**dict(wishes))} if wishes else {},
     }
 
 
@@ -150,7 +166,13 @@ def _bundle(spec: Spec, bundle: Bundle) -> dict[str, Any]:
         "x": x,
         "u": u,
         **_given(defect=bundle.defect, horizon=spec.trajectory.horizon),
+        **_rates(spec, bundle),
     }
+
+
+def _rates(spec: Spec, bundle: Bundle) -> dict[str, Any]:
+    rates = bundle.input_rate
+    return {} if rates is None else {"input_rate": _given(**dict(zip(spec.inputs, rates, strict=True)))}
 
 
 def _task(task: Task, horizon: Fraction | None) -> dict[str, Any]:
@@ -215,14 +237,15 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
 
 
 def _hardware(spec: Spec, own: Hardware) -> dict[str, Any]:
-    data: dict[str, Any] = {
+    return {
         "delay": ONE_SAMPLE if own.delay is None else number_text(own.delay),
         "noise": _given(**dict(zip(spec.states, own.noise, strict=True)))
         if isinstance(own.noise, tuple)
         else number_text(own.noise),
-        **_given(sample_time=own.sample_time, noise_rate=own.noise_rate),
+        "sample_time": number_text(own.sample_time),
+        "arithmetic": own.arithmetic,
+        "hold": own.hold,
     }
-    return data if own.arithmetic is None else data | {"arithmetic": own.arithmetic}
 
 
 def _simulation(wanted: Simulation) -> dict[str, Any]:

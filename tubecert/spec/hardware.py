@@ -1,25 +1,76 @@
-"""The sections `hardware` and `disturbance`: the machine that an engineer has, and what pushes it."""
+"""The sections `hardware` and `disturbance`: the machine that an engineer has, and what pushes it.
+
+A file that names its machine asks about the sampled loop: `check_machine` tells what else may then stand in it.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Final
+from typing import Final, TypeVar, get_args
 
-from tubecert.expression import ONE, ZERO, number_text
+from tubecert.digits import near
+from tubecert.expression import ONE, ZERO
 from tubecert.spec import codes
-from tubecert.spec.document import MappingNode, Scalar
+from tubecert.spec.document import ListNode, MappingNode, Scalar
 from tubecert.spec.instead import same_as
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
-from tubecert.spec.types import Arithmetic, Disturbance, Hardware, Term, TermMatrix, Vector
+from tubecert.spec.types import (
+    Arithmetic,
+    Controller,
+    Disturbance,
+    Hardware,
+    Hold,
+    Term,
+    TermMatrix,
+    Vector,
+)
 
-KEYS: Final = ("rate", "sample_time", "delay", "noise", "noise_rate", "arithmetic", "limits")
-EXACT: Final = "exact"
-_ARITHMETICS: Final[Mapping[str, Arithmetic]] = {"single": "single", "double": "double"}
+Word = TypeVar("Word", bound=str)
+
+KEYS: Final = ("rate", "sample_time", "delay", "noise", "arithmetic", "hold", "limits")
 ONE_SAMPLE: Final = "one sample"
 MAX_COLUMNS: Final = 32
+MAX_LATE: Final = 64  # samples of delay: every one is a state of the loop
+
+_ARITHMETICS: Final[tuple[Arithmetic, ...]] = get_args(Arithmetic)
+_HOLDS: Final[tuple[Hold, ...]] = get_args(Hold)
+_CONTROLLERS: Final[tuple[Controller, ...]] = get_args(Controller)
+_WITHOUT_METRIC: Final = "the sampled loop is proven without a metric: leave it out, or leave out hardware"
+_WIDTHS: Final = (
+    "the tube of a sampled loop is found, half_widths are wishes: leave it out, or leave out hardware"
+)
+_ONE_NUMBER: Final = "write one number, the bound of |w|; a list of them goes with hardware: {rate: 500}"
+_OF_A_COMPUTER: Final = "name the computer that it is about, hardware: {rate: 500}, or leave it out"
+IN_CONTINUOUS_TIME: Final = ("metric", "adaptation", "conditions")
+"""Sections of a file that asks about a loop in continuous time."""
+
+_TUBE_IN_TIME: Final = ("epsilon", "rho_a", "coordinates", "gap")
+
+
+def check_machine(entries: Mapping[str, Field]) -> None:
+    """Reports what does not go with `hardware`, and what does not go without."""
+    plan, tube, wind = (entries.get(key) for key in ("trajectory", "tube", "disturbance"))
+    if "hardware" in entries:
+        told = [(entries.get(key), _WITHOUT_METRIC) for key in IN_CONTINUOUS_TIME]
+        told += [(tube and tube.get(key), _WIDTHS) for key in _TUBE_IN_TIME]
+        beside = "beside"
+    else:
+        told = [(entries.get("controller"), _OF_A_COMPUTER)]
+        told += [(plan and plan.get(key), _OF_A_COMPUTER) for key in ("afterwards", "input_rate")]
+        bound = wind and wind.get("bound")
+        told += [(bound, _ONE_NUMBER)] if bound and isinstance(bound.node, ListNode) else []
+        beside = "without"
+    for field, help in told:
+        if field is not None:
+            field.fail(codes.RANGE, f"{field.path} {beside} hardware", help)
+
+
+def read_controller(field: Field | None) -> Controller:
+    """Whether a controller is to be found for the computer; `auto` also for what is unsound."""
+    return _one_of(field, _CONTROLLERS)
 
 
 def read_disturbance(field: Field | None, names: Names) -> Disturbance | None:
@@ -29,11 +80,21 @@ def read_disturbance(field: Field | None, names: Names) -> Disturbance | None:
         return None
     before = len(field.reader.findings)
     E = _shape(entries["E"], names) if "E" in entries else _identity(field, names)
-    bound = _size(entries, "bound", names)
+    bound = _bound(entries["bound"], len(E[0]) if E else None, names) if "bound" in entries else None
     rate = _size(entries, "rate", names)
     if E is None or bound is None or len(field.reader.findings) > before:
         return None
     return Disturbance(E=E, bound=bound, rate=rate)
+
+
+def _bound(field: Field, columns: int | None, names: Names) -> Fraction | Vector | None:
+    """|w|, or |w_i| by column of E, rounded up; None if unsound."""
+    if not isinstance(field.node, ListNode):
+        return field.number(names.values, least=0, side="above")
+    items = field.items(columns, "numbers, one per column of E") or []
+    sizes = [item.number(names.values, least=0, side="above") for item in items]
+    found = tuple(size for size in sizes if size is not None)
+    return found if found and len(found) == len(sizes) else None
 
 
 def _shape(field: Field, names: Names) -> TermMatrix | None:
@@ -77,24 +138,30 @@ def read_hardware(field: Field | None, names: Names) -> Hardware | None:
         if one_sample or _is_of_samples(entries, names)
         else _size(entries, "delay", names, default=Fraction(0))
     )
-    if delay is not None and sample_time is not None and delay > sample_time:
+    if delay is not None and sample_time is not None and delay > MAX_LATE * sample_time:
         entries["delay"].fail(
-            codes.RANGE,
-            f"hardware.delay is {number_text(delay)} s, longer than the sample time of {number_text(sample_time)} s",
+            codes.LIMIT,
+            f"hardware.delay is {near(float(delay / sample_time))} samples; at most {MAX_LATE} are read",
             f"write a time in seconds, or `delay: {ONE_SAMPLE}`, which follows the rate (in a sweep, too)",
         )
     noise = _noise(entries.get("noise"), names)
-    noise_rate = _size(entries, "noise_rate", names)
-    arithmetic = entries["arithmetic"].word((EXACT, *_ARITHMETICS)) if "arithmetic" in entries else EXACT
+    arithmetic = _one_of(entries.get("arithmetic"), _ARITHMETICS, "double")
+    hold = _one_of(entries.get("hold"), _HOLDS)
     if len(field.reader.findings) > before or sample_time is None or noise is None:
         return None
     return Hardware(
         sample_time=sample_time,
         delay=delay,
         noise=noise,
-        noise_rate=noise_rate,
-        arithmetic=_ARITHMETICS.get(arithmetic or EXACT),
+        arithmetic=arithmetic,
+        hold=hold,
     )
+
+
+def _one_of(field: Field | None, known: Sequence[Word], default: Word | None = None) -> Word:
+    """One of the words, the first by default."""
+    word = None if field is None else field.word(known)
+    return next((each for each in known if each == word), default or known[0])
 
 
 def _is_of_samples(entries: Mapping[str, Field], names: Names) -> bool:
@@ -114,19 +181,12 @@ def _is_of_samples(entries: Mapping[str, Field], names: Names) -> bool:
 
 def limits_of(limits: Field | None, hardware: Field | None) -> Field | None:
     """Where the limits of the inputs stand: in a section of their own, or in that of the hardware."""
-    own = _within(hardware, "limits")
+    own = None if hardware is None else hardware.get("limits")
     if own is not None and limits is not None:
         own.fail(
             codes.RANGE, "hardware.limits beside limits", "they are the same limits: give one of the two"
         )
     return limits or own
-
-
-def _within(section: Field | None, name: str) -> Field | None:
-    """The value of a key of a section, if it is there."""
-    if section is None or not isinstance(section.node, MappingNode):
-        return None
-    return next((section.child(key, node) for key, node in section.node.pairs if key.text == name), None)
 
 
 def _sample_time(field: Field, entries: Mapping[str, Field], names: Names) -> Fraction | None:

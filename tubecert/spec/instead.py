@@ -31,6 +31,9 @@ _SAME: Final[Mapping[str, str]] = {
     **dict.fromkeys(("bounds", "state_bounds", "state_constraints", "region", "set"), "safe_set"),
     **dict.fromkeys(("corners", "vertices", "points"), "polygon"),
     **dict.fromkeys(("goal", "end", "final", "x_goal", "xf"), "target"),
+    **dict.fromkeys(("u_rate", "slew_rate", "input_rates", "udot", "u_dot"), "input_rate"),
+    **dict.fromkeys(("after", "then", "at_end"), "afterwards"),
+    **dict.fromkeys(("precision", "float", "dtype"), "arithmetic"),
     "W_x": "dual_metric",
     **dict.fromkeys(("controls", "control"), "inputs"),
 }
@@ -78,7 +81,8 @@ _KEYS: Final[Mapping[str, str]] = {
         "certificate H, which knew it, is gone; leave it out",
     ),
     "windows": "windows of time are gone: one tube holds for the whole plan; leave it out, or ask for half_widths",
-    "control_rate": "a controller that is held between samples is not simulated now; leave it out",
+    "control_rate": "the computer that holds the input is the key hardware: {rate: 500}",
+    "noise_rate": "noise is arbitrary from sample to sample in what is proven: leave it out",
     "kernel": "there is one kernel, the tight one, which is never worse; leave it out",
     "Q": "Q follows from A_m: with P = I it is -(A_m + A_m'); leave it out",
     **dict.fromkeys(("circle", "sphere", "ball"), "a round obstacle is a disc: {center: [...], radius: ...}"),
@@ -109,7 +113,7 @@ _PLACES: Final[Mapping[str, str]] = {
 _SECTIONS: Final = frozenset(
     {
         *("name", "system", "safe_set", "uncertainty", "trajectory", "initial_state", "metric", "tube"),
-        *("adaptation", "conditions", "obstacles", "hardware", "disturbance", "limits"),
+        *("adaptation", "conditions", "obstacles", "hardware", "controller", "disturbance", "limits"),
         *("simulation", "expect"),
     }
 )
@@ -139,15 +143,29 @@ OTHER_WORDS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("proven", "proved", "ok"), "certified"),
     **dict.fromkeys(("yes", "on", "1"), "true"),
     **dict.fromkeys(("no", "off", "0"), "false"),
+    **dict.fromkeys(("float", "float32", "f32"), "single"),
+    **dict.fromkeys(("float64", "f64"), "double"),
+    **dict.fromkeys(("mid", "midpoint", "mean", "average"), "middle"),
+    **dict.fromkeys(("zoh", "start"), "left"),
+    **dict.fromkeys(("stop", "stay"), "rest"),
+    **dict.fromkeys(("loop", "periodic", "cycle", "again"), "repeat"),
 }
 """Words that other formats have for a choice."""
 
 GONE: Final[Mapping[str, str]] = {
-    **dict.fromkeys(("C", "c", "H", "h"), "certificates C and H are gone: let B decide"),
-    **dict.fromkeys(("sampled", "hardware"), "sampled and delayed loops are not covered now: leave it out"),
+    **dict.fromkeys(("C", "c"), "certificate C is gone: let B decide"),
+    **dict.fromkeys(
+        ("H", "h", "D", "sampled", "hardware"),
+        "name the computer, hardware: {rate: 500}, and leave conditions and the metric out: its loop is proven then",
+    ),
+    "exact": "what a computer rounds is part of what is proven: write double or single",
+}
+"""Words that there once were, or that belong elsewhere, and what to do instead."""
+
+NO_NUMBER: Final[Mapping[str, str]] = {
     "largest": "no machine and no disturbance is searched for now: write a number",
 }
-"""Words that there once were, and what to do instead."""
+"""The same where a number belongs."""
 
 EXAMPLES: Final[Mapping[str, str]] = {
     "horizon": "5, in s",

@@ -11,13 +11,26 @@ from tubecert.findings import Finding, Location, capped
 from tubecert.spec import codes
 from tubecert.spec.boxes import read_box, read_units
 from tubecert.spec.document import MappingNode, Scalar, compose
-from tubecert.spec.hardware import limits_of, read_disturbance, read_hardware
+from tubecert.spec.hardware import (
+    IN_CONTINUOUS_TIME,
+    check_machine,
+    limits_of,
+    read_controller,
+    read_disturbance,
+    read_hardware,
+)
 from tubecert.spec.limits import read_limits
 from tubecert.spec.names import Names, read_names
 from tubecert.spec.obstacles import read_obstacles
 from tubecert.spec.outputs import with_outputs
 from tubecert.spec.override import Setting, put
-from tubecert.spec.plan import at_rest, completed, read_initial_state, read_trajectory
+from tubecert.spec.plan import (
+    at_rest,
+    completed,
+    no_uncertainty,
+    read_initial_state,
+    read_trajectory,
+)
 from tubecert.spec.reader import Field, Reader, root_field
 from tubecert.spec.settings import (
     read_adaptation,
@@ -75,6 +88,7 @@ _OPTIONAL = (
     "limits",
     "simulation",
     "hardware",
+    "controller",
     "disturbance",
 )
 
@@ -160,14 +174,18 @@ def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None
         return None
     alone = _asks_about_metric(root)
     in_part = alone or reads in ("plant", "system")
+    loop = _LOOP if root.get("hardware") is None else _LOOP[1:]  # a machine may have no uncertainty
     entries = root.mapping(
-        required=_SYSTEM if in_part else (*_SYSTEM, *_LOOP), optional=(*_LOOP, *_METRIC, *_OPTIONAL)
+        required=_SYSTEM if in_part else (*_SYSTEM, *loop), optional=(*_LOOP, *_METRIC, *_OPTIONAL)
     )
     if entries is None:
         return None
+    check_machine(entries)
+    if "hardware" in entries:
+        entries = {key: field for key, field in entries.items() if key not in IN_CONTINUOUS_TIME}
     if alone and reads == "whole":
         root.reader.findings.append(_of_metric_alone(root.reader.source.file, entries["metric"].location))
-    lacks = tuple(key for key in _LOOP if key not in entries) if in_part and reads != "system" else ()
+    lacks = tuple(key for key in loop if key not in entries) if in_part and reads != "system" else ()
     if lacks or reads == "system":
         beside = ("metric", "tube") if reads == "plant" else _METRIC
         entries = {key: entries[key] for key in (*_SYSTEM, *beside) if key in entries}
@@ -251,6 +269,8 @@ def _read_named(
     units = read_units(system.get("units"), names)
     box = read_box(entries["safe_set"], names) if "safe_set" in entries else None
     uncertainty = read_uncertainty(entries["uncertainty"], names) if "uncertainty" in entries else None
+    if "hardware" in entries and "uncertainty" not in entries:
+        uncertainty = no_uncertainty(entries["hardware"], len(names.inputs))
     trajectory = entries.get("trajectory")
     plan = read_trajectory(trajectory, names) if trajectory else None
     start = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
@@ -272,7 +292,7 @@ def _read_named(
     if f is not None and dynamics is not None and plan is not None:
         h = () if uncertainty is None or uncertainty.h is None else uncertainty.h
         waves = (*dynamics[0], *h)
-        check_moving(f, dynamics[0], _beside_moving(plan, synthesis, waves))
+        check_moving(f, dynamics[0], _beside_moving(plan, synthesis, waves, machine="hardware" in entries))
     if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
         return None
     if plan is None or x0 is None or tube is None or adaptation is None:
@@ -311,15 +331,23 @@ def _read_named(
         limits=limits,
         simulation=simulation,
         hardware=hardware,
+        controller=read_controller(entries.get("controller")),
         disturbance=disturbance,
         locations=Places(reader.places),
     )
 
 
 def _beside_moving(
-    plan: Trajectory, synthesis: Synthesis | None, waves: Sequence[Term]
+    plan: Trajectory, synthesis: Synthesis | None, waves: Sequence[Term], *, machine: bool
 ) -> Iterator[tuple[bool, str, str]]:
     """What no theorem is stated for where f depends on t, with what to write; `waves` is all that does."""
+    if machine:
+        yield (
+            True,
+            "and with hardware it may not",
+            "what is known of t only may stand in h; or leave out hardware",
+        )
+        return
     lasting = "without a period that can be seen, so a trajectory with a horizon is needed"
     period = "or t in sin, cos and tan only, with frequencies that are rational multiples of each other"
     yield (

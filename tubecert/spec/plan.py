@@ -15,6 +15,7 @@ from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.table import read_table
 from tubecert.spec.types import (
+    Afterwards,
     Bundle,
     Interpolation,
     Matrix,
@@ -27,6 +28,7 @@ from tubecert.spec.types import (
 )
 
 KINDS: Final[tuple[PlanKind, ...]] = get_args(PlanKind)
+_AFTERWARDS: Final[tuple[Afterwards, ...]] = get_args(Afterwards)
 MAX_KNOTS: Final = 2_001
 MAX_WIDE: Final = 10  # sides of a box of starts: all its corners are examined
 
@@ -45,7 +47,24 @@ def read_trajectory(field: Field, names: Names) -> Trajectory | None:
         "any": _any,
     }
     kind = _kind(field)
-    return readers[kind](field, names) if kind else None
+    plan = readers[kind](field, names) if kind else None
+    return _continued(field.get("afterwards"), plan) if plan else None
+
+
+def _continued(field: Field | None, plan: Trajectory) -> Trajectory | None:
+    """The plan with what holds when its horizon is over."""
+    if field is None:
+        return plan
+    word = field.word(_AFTERWARDS)
+    if plan.horizon is None:
+        help = "the plan lasts for ever: leave afterwards out, or give trajectory.horizon, in s"
+        field.fail(codes.RANGE, f"{field.path} without a horizon", help)
+    elif plan.bundle is not None and word in ("rest", "repeat"):
+        help = "leave the horizon out: a family without one lasts for ever"
+        field.fail(codes.RANGE, f"{field.path} is {word}, and a family of plans has no end of its own", help)
+    return next(
+        (replace(plan, afterwards=each) for each in _AFTERWARDS if each == word and plan.horizon), None
+    )
 
 
 def at_rest(
@@ -53,15 +72,20 @@ def at_rest(
 ) -> tuple[Trajectory, Uncertainty]:
     """Rest in the middle of a box, and no uncertainty: where a plan is of no account. `field` is what it is about."""
     x = tuple(_constant_term(field, (low + high) / 2) for low, high in box)
-    none = tuple(_constant_term(field, Fraction(0)) for _ in range(inputs))
-    return Trajectory(kind="equilibrium", x=x, u=none, horizon=None), Uncertainty(h=none, bounds=None)
+    none = no_uncertainty(field, inputs)
+    return Trajectory(kind="equilibrium", x=x, u=none.h or (), horizon=None), none
+
+
+def no_uncertainty(field: Field, inputs: int) -> Uncertainty:
+    """h = 0, where nothing is said of it."""
+    return Uncertainty(h=tuple(_constant_term(field, Fraction(0)) for _ in range(inputs)), bounds=None)
 
 
 def _kind(field: Field) -> str | None:
     pairs = field.pairs(f"with a kind: {' or '.join(KINDS)}")
     if pairs is None:
         return None
-    kind = next((field.child(key, node) for key, node in pairs if key.text == "kind"), None)
+    kind = field.get("kind")
     if kind is None:
         field.fail(codes.MISSING_KEY, "trajectory lacks kind", f"add kind: {' or '.join(KINDS)}")
         return None
@@ -69,7 +93,7 @@ def _kind(field: Field) -> str | None:
 
 
 def _equilibrium(field: Field, names: Names) -> Trajectory | None:
-    entries = field.mapping(required=("kind", "at"), optional=("input", "horizon"))
+    entries = field.mapping(required=("kind", "at"), optional=("input", "horizon", "afterwards"))
     if entries is None:
         return None
     n, m = len(names.states), len(names.inputs)
@@ -86,7 +110,7 @@ def _equilibrium(field: Field, names: Names) -> Trajectory | None:
 
 
 def _expressions(field: Field, names: Names) -> Trajectory | None:
-    entries = field.mapping(required=("kind", "x", "u", "horizon"))
+    entries = field.mapping(required=("kind", "x", "u", "horizon"), optional=("afterwards",))
     if entries is None:
         return None
     scope = names.of_plan()
@@ -99,7 +123,7 @@ def _expressions(field: Field, names: Names) -> Trajectory | None:
 
 
 def _csv(field: Field, names: Names) -> Trajectory | None:
-    entries = field.mapping(required=("kind", "file"), optional=("interpolation", "horizon"))
+    entries = field.mapping(required=("kind", "file"), optional=("interpolation", "horizon", "afterwards"))
     if entries is None:
         return None
     interpolation, sound = _interpolation(entries.get("interpolation"), "linear", _OF_FILES)
@@ -116,7 +140,7 @@ def _csv(field: Field, names: Names) -> Trajectory | None:
 
 
 def _ilqr(field: Field, names: Names) -> Trajectory | None:
-    optional = ("start", "input", "knots", "Q", "R", "goal", "interpolation")
+    optional = ("start", "input", "knots", "Q", "R", "goal", "interpolation", "afterwards")
     entries = field.mapping(required=("kind", "target", "horizon"), optional=optional)
     if entries is None:
         return None
@@ -149,7 +173,8 @@ def _ilqr(field: Field, names: Names) -> Trajectory | None:
 
 
 def _any(field: Field, names: Names) -> Trajectory | None:
-    entries = field.mapping(required=("kind", "x", "u"), optional=("defect", "horizon"))
+    optional = ("defect", "input_rate", "horizon", "afterwards")
+    entries = field.mapping(required=("kind", "x", "u"), optional=optional)
     if entries is None:
         return None
     x = _ranges(entries.get("x"), names.states, names)
@@ -157,10 +182,23 @@ def _any(field: Field, names: Names) -> Trajectory | None:
     defect = (
         entries["defect"].number(names.values, least=0, side="above") if "defect" in entries else Fraction(0)
     )
+    rate = _input_rate(entries["input_rate"], names) if "input_rate" in entries else None
     horizon, sound = _horizon(entries.get("horizon"), names)
-    if x is None or u is None or defect is None or not sound:
+    if x is None or u is None or defect is None or not sound or (rate is None and "input_rate" in entries):
         return None
-    return Trajectory(kind="any", horizon=horizon, bundle=Bundle(x=x, u=u, defect=defect))
+    return Trajectory(kind="any", horizon=horizon, bundle=Bundle(x=x, u=u, defect=defect, input_rate=rate))
+
+
+def _input_rate(field: Field, names: Names) -> Vector | None:
+    """|u*'| of every input, by one number or input by input, rounded up."""
+    if not isinstance(field.node, MappingNode):
+        found = [field.number(names.values, least=0, side="above")] * len(names.inputs)
+    else:
+        entries = field.mapping(required=names.inputs) or {}
+        own = (entries[name] for name in names.inputs if name in entries)
+        found = [each.number(names.values, least=0, side="above") for each in own]
+    rates = tuple(rate for rate in found if rate is not None)
+    return rates if len(rates) == len(names.inputs) else None
 
 
 def _ranges(
@@ -259,7 +297,7 @@ def read_initial_state(
     def planned() -> Vector | None:
         return _start(trajectory, plan) if trajectory and plan else None
 
-    if plan is not None and plan.bundle is not None and (field is None or not _has(field, "within")):
+    if plan is not None and plan.bundle is not None and (field is None or field.get("within") is None):
         message = "a family of plans has no start of its own"
         where = trajectory if field is None else field
         if where is not None:
@@ -349,10 +387,6 @@ def _of_one_number(field: Field, names: Names) -> str:
     size = text.removeprefix("-")
     minus = f"-({size})" if set(size) & {"+", "-"} else f"-{size}"
     return f"write {name}[{minus}, {size}] for the interval, {point} for the point"
-
-
-def _has(field: Field, key: str) -> bool:
-    return isinstance(field.node, MappingNode) and any(own.text == key for own, _ in field.node.pairs)
 
 
 def _start(field: Field, plan: Trajectory) -> Vector | None:

@@ -26,7 +26,7 @@ from tubecert.expression import (
 from tubecert.findings import MOST, Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
-from tubecert.spec.instead import EXAMPLES, GONE, OTHER_WORDS, glued, of_key, of_value
+from tubecert.spec.instead import EXAMPLES, GONE, NO_NUMBER, OTHER_WORDS, glued, of_key, of_value
 from tubecert.spec.scope import MODERATE, Parameters, Scope, out_of_range
 from tubecert.spec.source import Mark, Source
 from tubecert.spec.types import Matrix, Term, TermMatrix
@@ -81,6 +81,11 @@ class Field:
         below = Field(reader=self.reader, path=self._name(key.text), node=node, key=key)
         self.reader.places[below.path] = below.location
         return below
+
+    def get(self, name: str) -> Field | None:
+        """The value of a key, if this is a mapping that has it."""
+        pairs = self.node.pairs if isinstance(self.node, MappingNode) else ()
+        return next((self.child(key, node) for key, node in pairs if key.text == name), None)
 
     def item(self, index: int, node: Node) -> Field:
         """An item of a list."""
@@ -197,7 +202,7 @@ class Field:
         try:
             value = parse_number(self.node.text, parameters, side)
         except ExpressionError as error:
-            error.help = GONE.get(self.node.text, error.help)
+            error.help = NO_NUMBER.get(self.node.text, error.help)
             self._expression_error(error, codes.NUMBER)
             return None
         if extreme := out_of_range(value):

@@ -107,14 +107,19 @@ class Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bundle:
-    """A family of plans: x* (n ranges) and u* (m ranges) stay in boxes, the defect (state units per s) is limited."""
+    """A family of plans: x* (n ranges) and u* (m ranges) stay in boxes, the defect (state units per s) is limited.
+
+    `input_rate` (m), where it is known, bounds |u*'| of every input; None beside hardware: u* is held as inputs are.
+    """
 
     x: tuple[tuple[Fraction, Fraction], ...]
     u: tuple[tuple[Fraction, Fraction], ...]
     defect: Fraction
+    input_rate: Vector | None = None
 
 
 PlanKind = Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
+Afterwards = Literal["nothing", "rest", "repeat"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +127,7 @@ class Trajectory:
     """The plan: horizon in s, and what its kind needs.
 
     x (n) and u (m) are expressions of t (constants for an equilibrium); csv has a `table`, ilqr a `task`, any
-    a `bundle` instead.
+    a `bundle` instead. `afterwards`: what a computer does when the horizon is over, of which the tube holds as well.
     """
 
     kind: PlanKind
@@ -132,8 +137,10 @@ class Trajectory:
     table: Table | None = None
     task: Task | None = None
     bundle: Bundle | None = None
+    afterwards: Afterwards = "nothing"
 
     def __post_init__(self) -> None:
+        assert self.horizon is not None or self.afterwards == "nothing"
         assert (self.table is not None) == (self.kind == "csv")
         assert (self.task is not None) == (self.kind == "ilqr")
         assert (self.bundle is not None) == (self.kind == "any")
@@ -260,6 +267,8 @@ class Simulation:
 
 
 Arithmetic = Literal["single", "double"]
+Hold = Literal["middle", "left", "continuous"]
+Controller = Literal["auto", "none"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -267,27 +276,38 @@ class Hardware:
     """The computer, the sensors and their delay; times in s.
 
     `sample_time` of the inputs; `delay` from a sample to its input, None: one sample time, whatever that is; `noise`:
-    |n| is at most, or |n_i| per state (n), in units of the states; `noise_rate` bounds |n'|; `arithmetic`: what the
-    controller computes in, None where it computes exactly.
+    |n| is at most, or |n_i| per state (n), in units of the states; `arithmetic`: what the controller computes in;
+    `hold`: of u* over the time in which an input acts, its middle, its left end, or all of it.
     """
 
     sample_time: Fraction
     delay: Fraction | None = Fraction(0)
     noise: Fraction | Vector = Fraction(0)
-    noise_rate: Fraction | None = None
-    arithmetic: Arithmetic | None = None
+    arithmetic: Arithmetic = "double"
+    hold: Hold = "middle"
+
+    @property
+    def delayed(self) -> Fraction:
+        """The delay in s."""
+        return self.sample_time if self.delay is None else self.delay
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
-    """What acts beside the inputs: E(x) w, E (n, k), |w| <= `bound`.
+    """What acts beside the inputs: E(x) w, E (n, k), |w| <= `bound`, or |w_i| <= `bound`[i] (k) beside hardware.
 
-    `rate` in 1/s, if |w'| is at most that: what of it the inputs can reach is adapted to.
+    `rate` in 1/s, if |w'|, or every |w_i'|, is at most that: what of it the inputs can reach is adapted to.
     """
 
     E: TermMatrix
-    bound: Fraction
+    bound: Fraction | Vector
     rate: Fraction | None = None
+
+    @property
+    def length(self) -> Fraction:
+        """The bound of |w| of a loop in continuous time."""
+        assert isinstance(self.bound, Fraction)
+        return self.bound
 
 
 class Places(Mapping[str, Location]):
@@ -350,7 +370,8 @@ class Spec:
     obstacles: tuple[Obstacle, ...] = ()
     limits: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()  # by input, of some of them
     simulation: Simulation | None = None
-    hardware: Hardware | None = None
+    hardware: Hardware | None = None  # then there is no metric, and none is asked for
+    controller: Controller = "auto"
     disturbance: Disturbance | None = None
     settings: tuple[tuple[str, str], ...] = ()  # keys set by the command line, with their texts
     lacks: tuple[str, ...] = ()  # sections that a file need not have that asks about a metric alone
@@ -362,6 +383,7 @@ class Spec:
         assert all(len(row) == m for row in self.B)
         assert len(self.start_box) in (0, n)
         assert self.disturbance is None or len(self.disturbance.E) == n
+        assert self.hardware is None or (self.metric is None and self.synthesis is None)
 
     @property
     def lengths(self) -> tuple[str, ...]:

@@ -234,7 +234,7 @@ def _problem(tube: TubeFound, suprema: Suprema, constants: BoundConstants) -> Tu
     wind, blows = spec.disturbance, wind_constants(suprema, constants.metric_input_gain)
     return TubeProblem(
         constants=constants,
-        wind=None if wind is None or blows is None else Wind(bound=wind.bound, constants=blows),
+        wind=None if wind is None or blows is None else Wind(bound=wind.length, constants=blows),
         residual=residual_constants(suprema),
         gained=bool(question.model.gained),
         rate=question.model.rate,
