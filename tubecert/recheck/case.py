@@ -103,7 +103,7 @@ class Case:
         if wind is None:
             return None
         push, size, explained = (self._ball(name) for name in disturbed.CONSTANTS)
-        return WindNumbers(push, size, explained, exact(wind.bound))
+        return WindNumbers(push, size, explained, exact(wind.length))
 
     def _ball(self, name: str) -> Ball:
         """The upper end of a constant, not a number where it has none."""

@@ -46,7 +46,7 @@ def own_claim(spec: Specification) -> Claim:
         start=spec.start,
         uncertainty=spec.uncertainty.words,
         plans=_plans(spec.trajectory) if isinstance(spec.trajectory, AnyPlan) else None,
-        wind=None if spec.disturbance is None else Wind(spec.disturbance.bound, spec.disturbance.rate),
+        wind=None if spec.disturbance is None else Wind(spec.disturbance.length, spec.disturbance.rate),
         parameters=spec.plant.ranges or None,
     )
 

@@ -193,8 +193,6 @@ def assumptions(result: Result, s: System) -> Outcome:
     """The list of what is assumed is that of this format, each with the parameters of the specification."""
     geodesics = None if result.metric is None else result.metric.geodesics
     wanted = _assumed(s, geodesics)
-    if result.specification.hardware is not None:
-        wanted.append(Assumption("hardware_left_out", {}))
     for own, named in zip(result.assumptions, wanted, strict=False):
         if own != named:
             return stated(
@@ -225,7 +223,7 @@ def _assumed(s: System, geodesics: Geodesics | None) -> list[Assumption]:
 
 
 def _blowing(wind: Disturbance) -> Assumption:
-    known = {"bound": wind.bound, "rate": wind.rate}
+    known = {"bound": wind.length, "rate": wind.rate}
     return Assumption("wind_within", {name: value for name, value in known.items() if value is not None})
 
 

@@ -90,6 +90,10 @@ class Node:
                 raise Node(None, f"{self.path}.{key[:60]}").refused("is not known in this place")
         return Members(self, {key: self._member(key) for key in self.mapping()})
 
+    def without(self, *keys: str) -> Node:
+        """The object without these keys, which somebody else reads; at the same place."""
+        return Node({key: value for key, value in self.mapping().items() if key not in keys}, self._at)
+
     def items(self) -> Iterator[tuple[str, Node]]:
         """The members of an object whose keys are names of somebody else's."""
         for key in self.mapping():

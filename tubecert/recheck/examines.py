@@ -205,8 +205,6 @@ EXAMINED: Final[Mapping[str, str]] = {
     "spec.effective.disturbance.E": "wind_push <=",
     "spec.effective.disturbance.bound": _CLAIM,
     "spec.effective.disturbance.rate": _CLAIM,
-    # no certificate is about the machine that runs the controller: that is an assumption
-    "spec.effective.hardware.**": "assumptions are complete",
 }
 
 

@@ -194,7 +194,6 @@ _ASSUMPTIONS: Mapping[str, Form] = {
     "perfect_state": _NONE,
     "first_order_filter": _NONE,
     "for_all_time": _NONE,
-    "hardware_left_out": _NONE,
     "up_to_horizon": ({"horizon": Node.decimal}, {}),
     "uncertainty_as_declared": _NONE,
     "uncertainty_as_given": ({"any_within_bounds": Node.flag}, {}),

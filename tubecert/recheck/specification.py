@@ -11,7 +11,12 @@ from fractions import Fraction
 
 from tubecert.recheck.document import Members, Node, digest, wrong
 from tubecert.recheck.obstacles import Obstacle, read_obstacle
-from tubecert.recheck.specified.hardware import MACHINE, Disturbance, Hardware, read_machine
+from tubecert.recheck.specified.hardware import (
+    Disturbance,
+    Hardware,
+    read_disturbance,
+    read_hardware,
+)
 from tubecert.recheck.specified.idle import IDLE, read_idle
 from tubecert.recheck.specified.loop import Loop, read_loop
 from tubecert.recheck.specified.metric import Metric, Wanted, read_metric
@@ -21,6 +26,7 @@ from tubecert.recheck.specified.start import Start, read_start
 from tubecert.recheck.specified.trajectory import (
     AnyPlan,
     Trajectory,
+    read_lasting,
     read_trajectory,
 )
 from tubecert.recheck.times import period_of
@@ -28,7 +34,7 @@ from tubecert.recheck.times import period_of
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """Everything; `hash` is of the canonical bytes, `content` of those members that a claim may rest on."""
+    """A loop in continuous time; `hash` is of the canonical bytes, `content` of what a claim may rest on."""
 
     plant: Plant
     uncertainty: Uncertainty
@@ -42,33 +48,44 @@ class Specification:
     loop: Loop
     obstacles: tuple[Obstacle, ...]
     limits: dict[str, Range]  # by input, of some of them
-    hardware: Hardware | None
     disturbance: Disturbance | None
     hash: str
     content: str
 
 
+@dataclass(frozen=True, slots=True)
+class SampledSpecification:
+    """A loop that a computer closes, without a metric; `hash` is of the canonical bytes.
+
+    `afterwards`: nothing, rest or repeat; nothing also where there is no horizon. `controller`: auto or none.
+    Half-widths are wishes, of which nothing is claimed.
+    """
+
+    plant: Plant
+    uncertainty: Uncertainty
+    trajectory: Trajectory
+    afterwards: str
+    start: Start
+    half_widths: dict[str, Fraction]
+    obstacles: tuple[Obstacle, ...]
+    limits: dict[str, Range]  # by input, of some of them
+    hardware: Hardware
+    controller: str
+    disturbance: Disturbance | None
+    hash: str
+
+
+_ALWAYS = ("tubecert", "name", "system", "safe_set", "uncertainty", "trajectory", "initial_state", "tube")
+
+
 def read_specification(node: Node) -> Specification:
-    """The specification; raises `CertificateError` for whatever is not of the canonical form."""
-    own = node.closed(
-        "tubecert",
-        "name",
-        "system",
-        "safe_set",
-        "uncertainty",
-        "trajectory",
-        "initial_state",
-        "tube",
-        "adaptation",
-        "conditions",
-        "metric",
-        optional=(*IDLE[1:], *MACHINE),
-    )
+    """That of a loop in continuous time; raises `CertificateError` for whatever is not of the canonical form."""
+    optional = (*IDLE[1:], "disturbance")
+    own = node.closed(*_ALWAYS, "adaptation", "conditions", "metric", optional=optional)
     _version(own["tubecert"])
     own["name"].text()
     plant = read_plant(own["system"], own["safe_set"])
     tube = _tube(own["tube"], plant)
-    hardware, disturbance = read_machine(own, plant.states)
     trajectory = read_trajectory(own["trajectory"], plant)
     found = Specification(
         plant=plant,
@@ -81,12 +98,9 @@ def read_specification(node: Node) -> Specification:
         coordinates="coordinates" in tube,
         half_widths=tube.get("half_widths", _widths) or {},
         loop=read_loop(own["adaptation"], own["conditions"]),
-        obstacles=tuple(read_obstacle(item, plant.states) for item in own["obstacles"].entries())
-        if "obstacles" in own
-        else (),
+        obstacles=_obstacles(own, plant),
         limits=own.get("limits", lambda item: _limits(item, plant.inputs)) or {},
-        hardware=hardware,
-        disturbance=disturbance,
+        disturbance=own.get("disturbance", lambda item: read_disturbance(item, plant.states)),
         hash=digest(node.value),
         content=digest({key: value for key, value in node.mapping().items() if key not in IDLE}),
     )
@@ -95,9 +109,60 @@ def read_specification(node: Node) -> Specification:
         _moving(own, found)
     if plant.gained is not None:
         raise own["system"].refused("has a B that is not known, which no theorem covers")
-    if isinstance(found.trajectory, AnyPlan) and found.start.within is None:
-        raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
+    _startable(own, found.trajectory, found.start)
     return found
+
+
+def read_sampled_specification(node: Node) -> SampledSpecification:
+    """That of a loop that a computer closes; raises `CertificateError` for whatever is not of the canonical form.
+
+    B may depend on parameters known by ranges; f is free of t.
+    """
+    own = node.closed(*_ALWAYS, "hardware", "controller", optional=(*IDLE[1:], "disturbance"))
+    _version(own["tubecert"])
+    own["name"].text()
+    plant = read_plant(own["system"], own["safe_set"])
+    if plant.varies:
+        raise own["system"].refused("has an f that depends on t, which a sampled loop may not have")
+    wishes = own["tube"].closed(optional=("half_widths",)).get("half_widths", lambda it: _wishes(it, plant))
+    trajectory, afterwards = read_lasting(own["trajectory"], plant)
+    states = plant.states
+    found = SampledSpecification(
+        plant=plant,
+        uncertainty=read_uncertainty(own["uncertainty"], plant),
+        trajectory=trajectory,
+        afterwards=afterwards,
+        start=read_start(own["initial_state"], states),
+        half_widths=wishes or {},
+        obstacles=_obstacles(own, plant),
+        limits=own.get("limits", lambda item: _limits(item, plant.inputs)) or {},
+        hardware=read_hardware(own["hardware"], states),
+        controller=own["controller"].word("auto", "none"),
+        disturbance=own.get("disturbance", lambda item: read_disturbance(item, states, sampled=True)),
+        hash=digest(node.value),
+    )
+    read_idle(own, plant)
+    _startable(own, trajectory, found.start)
+    return found
+
+
+def _obstacles(own: Members, plant: Plant) -> tuple[Obstacle, ...]:
+    entries = own["obstacles"].entries() if "obstacles" in own else []
+    return tuple(read_obstacle(item, plant.states) for item in entries)
+
+
+def _startable(own: Members, trajectory: Trajectory, start: Start) -> None:
+    """Raises for a family of plans that does not start within a radius."""
+    if isinstance(trajectory, AnyPlan) and start.within is None:
+        raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
+
+
+def _wishes(node: Node, plant: Plant) -> dict[str, Fraction]:
+    """Half-widths of some states or outputs."""
+    node.closed(optional=tuple(plant.lengths))
+    if not node.mapping():
+        raise node.refused("must have half-widths of some states or outputs")
+    return _widths(node)
 
 
 def _moving(own: Members, found: Specification) -> None:

@@ -119,7 +119,7 @@ def adapted(place: Place) -> Matrix | None:
     wind = place.system.wind
     if wind is None or wind.rate is None:
         return None
-    return scaled(wind.bound, blown(place).explained)
+    return scaled(wind.length, blown(place).explained)
 
 
 def added_to(place: Place, name: str) -> list[Matrix]:

@@ -266,7 +266,7 @@ class Simulation:
     h: tuple[Term, ...] | None = None
 
 
-Arithmetic = Literal["single", "double"]
+Arithmetic = Literal["double", "single"]
 Hold = Literal["middle", "left", "continuous"]
 Controller = Literal["auto", "none"]
 

@@ -6,59 +6,61 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.document import Members, Node
+from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import Owed
 from tubecert.recheck.reading import Reader
 from tubecert.recheck.specified.numbers import Numbers, not_negative, positive
 from tubecert.recheck.terms import Matrix
 
-MACHINE = ("hardware", "disturbance")
 _ONE_SAMPLE = "one sample"
 _MOST_COLUMNS = 32
+_MOST_LATE = 64  # samples of delay
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hardware:
-    """The computer and the sensors, of which no claim is made yet; times in s.
+    """The computer and the sensors; times in s.
 
-    `delay` None: one sample time. `noise` is a Euclidean length, or one size per state. `arithmetic` that the
-    controller computes in; None: it is exact.
+    `noise` is a Euclidean length, or one size per state. `arithmetic`, single or double, that the controller computes
+    in; `hold`, middle, left or continuous: where in the time in which an input acts u* is read.
     """
 
     sample_time: Fraction
-    delay: Fraction | None
+    delay: Fraction
     noise: Fraction | Numbers
-    noise_rate: Fraction | None
-    arithmetic: str | None
+    arithmetic: str
+    hold: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
-    """E(x) w, |w| <= `bound`, |w'| <= `rate` if there is one."""
+    """E(x) w, |w| <= `bound`, or |w_i| <= `bound`[i]; |w'|, or every |w_i'|, <= `rate` if there is one."""
 
     E: Matrix
-    bound: Fraction
+    bound: Fraction | Numbers
     rate: Fraction | None
     duties: tuple[Owed, ...]
 
+    @property
+    def length(self) -> Fraction:
+        """The bound of |w| of a loop in continuous time, which has no other."""
+        assert isinstance(self.bound, Fraction)
+        return self.bound
 
-def read_machine(own: Members, states: Sequence[str]) -> tuple[Hardware | None, Disturbance | None]:
-    """`hardware` and `disturbance`, where they are."""
-    machine = own.get("hardware", lambda item: _hardware(item, states))
-    return machine, own.get("disturbance", lambda item: _disturbance(item, states))
 
-
-def _hardware(node: Node, states: Sequence[str]) -> Hardware:
-    own = node.closed("sample_time", "delay", "noise", optional=("noise_rate", "arithmetic"))
+def read_hardware(node: Node, states: Sequence[str]) -> Hardware:
+    """`hardware`."""
+    own = node.closed("sample_time", "delay", "noise", "arithmetic", "hold")
+    sample_time, delay = positive(own["sample_time"]), own["delay"]
     found = Hardware(
-        sample_time=positive(own["sample_time"]),
-        delay=None if own["delay"].value == _ONE_SAMPLE else not_negative(own["delay"]),
+        sample_time=sample_time,
+        delay=sample_time if delay.value == _ONE_SAMPLE else not_negative(delay),
         noise=_noise(own["noise"], states),
-        noise_rate=own.get("noise_rate", not_negative),
-        arithmetic=own.get("arithmetic", lambda item: item.word("single", "double")),
+        arithmetic=own["arithmetic"].word("single", "double"),
+        hold=own["hold"].word("middle", "left", "continuous"),
     )
-    if found.delay is not None and found.delay > found.sample_time:
-        raise own["delay"].refused("is longer than the sample time")
+    if found.delay > _MOST_LATE * sample_time:
+        raise delay.refused(f"is longer than {_MOST_LATE} samples")
     return found
 
 
@@ -70,7 +72,8 @@ def _noise(node: Node, states: Sequence[str]) -> Fraction | Numbers:
     return tuple(not_negative(own[name]) for name in states)
 
 
-def _disturbance(node: Node, states: Sequence[str]) -> Disturbance:
+def read_disturbance(node: Node, states: Sequence[str], *, sampled: bool = False) -> Disturbance:
+    """`disturbance`; of a sampled loop it may be bounded component by component."""
     own = node.closed("E", "bound", optional=("rate",))
     reader = Reader.of(states)
     rows = own["E"].sized(len(states))
@@ -79,7 +82,14 @@ def _disturbance(node: Node, states: Sequence[str]) -> Disturbance:
         raise own["E"].refused(f"must have 1 to {_MOST_COLUMNS} columns")
     return Disturbance(
         E=reader.matrix(own["E"], len(states), width),
-        bound=not_negative(own["bound"]),
+        bound=_sizes(own["bound"], width) if sampled else not_negative(own["bound"]),
         rate=own.get("rate", not_negative),
         duties=tuple(reader.duties),
     )
+
+
+def _sizes(node: Node, width: int) -> Fraction | Numbers:
+    """A length, or a size for every column of E."""
+    if not isinstance(node.value, list):
+        return not_negative(node)
+    return tuple(not_negative(item) for item in node.sized(width))

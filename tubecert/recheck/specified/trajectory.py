@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from tubecert.recheck.document import Node
@@ -66,13 +66,17 @@ class Planned:
 
 @dataclass(frozen=True, slots=True)
 class AnyPlan:
-    """Every plan with x* and u* in boxes, by name, and |x*' - f - B u*| <= `defect`."""
+    """Every plan with x* and u* in boxes, by name, and |x*' - f - B u*| <= `defect`.
+
+    `input_rate` (m): |u_j*'| where it is bounded; None in a sampled loop: u* is held as its inputs are.
+    """
 
     x: dict[str, Range]
     u: dict[str, Range]
     defect: Fraction
     horizon: Fraction | None
     kind: str = "any"
+    input_rate: Numbers | None = None
 
 
 Trajectory = Resting | Expressed | Tabled | Planned | AnyPlan
@@ -93,6 +97,22 @@ def read_trajectory(node: Node, plant: Plant) -> Trajectory:
     if not isinstance(kind, str) or kind not in readers:
         raise node.refused(f"must have a kind, one of {', '.join(map(str, readers))}, expressions, any")
     return readers[kind](node, n, m)
+
+
+def read_lasting(node: Node, plant: Plant) -> tuple[Trajectory, str]:
+    """The plan of a sampled loop, and what holds when its horizon is over: nothing, rest or repeat."""
+    own = dict(node.items())
+    if ("afterwards" in own) != ("horizon" in own):
+        raise node.refused("must say what holds afterwards if it has a horizon, and only then")
+    plan = read_trajectory(node.without("afterwards", "input_rate"), plant)
+    words = ("nothing",) if isinstance(plan, AnyPlan) else ("nothing", "rest", "repeat")
+    after = own["afterwards"].word(*words) if "afterwards" in own else "nothing"
+    if "input_rate" not in own:
+        return plan, after
+    if not isinstance(plan, AnyPlan):
+        raise own["input_rate"].refused("is not known in this place")
+    rates = own["input_rate"].closed(*plant.inputs)
+    return replace(plan, input_rate=tuple(not_negative(rates[name]) for name in plant.inputs)), after
 
 
 def _resting(node: Node, n: int, m: int) -> Resting:
