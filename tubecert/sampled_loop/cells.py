@@ -1,4 +1,4 @@
-"""Where a plan is: windows of its time, or cells of a family's box, as batches that a tape can run over. Trusted: yes."""
+"""Where a plan is: windows of its time, or cells of a family's boxes, as batches for a tape. Trusted: yes."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
-from tubecert.expression import free_symbols, symbol
+from tubecert.enclosure.tape import Tape
+from tubecert.expression import derivatives, free_symbols, symbol
 from tubecert.expression.matrix import column, combine, jacobian, multiply
 from tubecert.model import TIME
 from tubecert.sampled_loop.setting import Loop
 from tubecert.trajectory.family import Family
+from tubecert.trajectory.pieces import PiecewisePlan
 
 _TIMES: Final = 64  # windows of a period of h, beside a plan that does not share it
 MOST: Final = 4096  # windows that a proof may ask for
@@ -119,10 +121,6 @@ def steepness(loop: Loop, count: int) -> Array | None:
 
 
 def _along(loop: Loop, count: int) -> Array | None:
-    from tubecert.enclosure.tape import Tape
-    from tubecert.expression import derivatives
-    from tubecert.trajectory.pieces import PiecewisePlan
-
     plan = loop.plan
     if isinstance(plan, PiecewisePlan):
         if plan.data.interpolation == "hold":

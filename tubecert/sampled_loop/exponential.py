@@ -1,7 +1,7 @@
 """Phi(s) = e^(A s) and J(s) = int_0^s Phi, enclosed. Trusted: yes.
 
-J(s) = s (I + A s/2 (I + A s/3 (..))) by Horner's rule, then Phi = I + A J exactly. What the series leaves out is at most
-s v^(K+1)/(K+2)! e^v in every entry, where v = |A| s in the norm of row sums, which no entry of a power exceeds (theory,
+J(s) = s (I + A s/2 (I + A s/3 (..))) by Horner's rule, then Phi = I + A J exactly. What the series leaves out is at
+most s v^(K+1)/(K+2)! e^v in every entry, where v = |A| s in the norm of row sums, which no power exceeds (theory,
 section 2; entry by entry with |A|^(K+1) it would be false). Longer times are halved until v <= 1/2, then doubled:
 J(2 s) = (I + Phi(s)) J(s), Phi(2 s) = Phi(s)^2.
 """

@@ -40,7 +40,9 @@ class Known:
     @classmethod
     def stacked(cls, rows: Sequence[Sequence[Known]]) -> Known:
         """Blocks side by side and one above the other."""
-        return cls(*(np.block([[getattr(own, name) for own in row] for row in rows]) for name in ("mid", "rad")))
+        return cls(
+            *(np.block([[getattr(own, name) for own in row] for row in rows]) for name in ("mid", "rad"))
+        )
 
     @property
     def above(self) -> Array:

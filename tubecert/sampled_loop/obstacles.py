@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.sampled_loop.cells import Cells, cells_of
@@ -15,6 +16,7 @@ from tubecert.spec.types import Obstacle
 from tubecert.verdict import Verdict
 
 _WINDOWS: Final = 2048
+Truths = NDArray[np.bool_]
 
 
 def cleared(loop: Loop, W: Array, starts: Sequence[int]) -> tuple[Cleared, ...]:
@@ -45,7 +47,7 @@ def _widths(loop: Loop, cells: Cells, W: Array, starts: Sequence[int]) -> Array:
     return np.asarray(np.max(np.where(meets[:, :, None], W[None], 0.0), axis=1))
 
 
-def _apart(obstacle: Obstacle, box: Interval) -> Array:
+def _apart(obstacle: Obstacle, box: Interval) -> Truths:
     """Whether boxes (N, 2) are proven not to meet an obstacle, (N,)."""
     if obstacle.radius is not None:
         centre = Interval(*np.array([fraction_bounds(c) for c in obstacle.center]).T)
@@ -56,11 +58,11 @@ def _apart(obstacle: Obstacle, box: Interval) -> Array:
     corners = [Interval(*np.array([fraction_bounds(c) for c in corner]).T) for corner in obstacle.polygon]
     apart = _outside(corners, box)
     for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
-        apart &= _missed(a, b, box)
+        apart = apart & _missed(a, b, box)
     return apart
 
 
-def _missed(a: Interval, b: Interval, box: Interval) -> Array:
+def _missed(a: Interval, b: Interval, box: Interval) -> Truths:
     """Whether the edge from a to b misses boxes: separated along an axis, or by the line through it."""
     low, high = np.minimum(a.lo, b.lo), np.maximum(a.hi, b.hi)
     axis = ((box.lo > high) | (box.hi < low)).any(axis=1)
@@ -68,7 +70,7 @@ def _missed(a: Interval, b: Interval, box: Interval) -> Array:
     return np.asarray(axis | (side.lo > 0) | (side.hi < 0))
 
 
-def _outside(corners: Sequence[Interval], box: Interval) -> Array:
+def _outside(corners: Sequence[Interval], box: Interval) -> Truths:
     """Whether a point of each box is outside the polygon: a ray to the right meets its edges an even number of times.
 
     An edge counts if it spans the height of the point in the half-open sense; where an edge cannot be told to lie left

@@ -1,7 +1,7 @@
 """What of the loop is not linear, bounded on the tube, and the sizes and rates of what its signals are.
 
-Everything is a supremum over cells of the plan, by mean values: F(x + e) - F(x) - A e = int (F_x(x + a e) - A) da e, with
-the integral bounded on `_LEVELS` parts of [0, 1], each on its own box. Trusted: yes.
+Everything is a supremum over cells of the plan, by mean values: F(x + e) - F(x) - A e = int (F_x(x + a e) - A) da e,
+with the integral bounded on `_LEVELS` parts of [0, 1], each on its own box. Trusted: yes.
 Implements: theory of the sampled loop, section 4.
 """
 
@@ -23,7 +23,14 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import ZERO, Expression, derivatives, symbol
 from tubecert.expression.matrix import column, combine, jacobian, multiply
 from tubecert.model import TIME
-from tubecert.sampled_loop.cells import Cells, cells_of, end_of, in_time, largest_jump, moves_in_time, steepness
+from tubecert.sampled_loop.cells import (
+    cells_of,
+    end_of,
+    in_time,
+    largest_jump,
+    moves_in_time,
+    steepness,
+)
 from tubecert.sampled_loop.midrad import SUMMED, total
 from tubecert.sampled_loop.setting import PLAN_ROUNDING, Loop
 from tubecert.trajectory.family import Family

@@ -1,7 +1,7 @@
-"""How outputs of the loop answer to every signal, lag by lag: rows of floats, what they miss, and integrals of kernels.
+"""How outputs of the loop answer to every signal, lag by lag: rows of floats, what they miss, integrals of kernels.
 
-An output is a row c of xi = (e, zeta, v_1..v_(q+1), eta). Rows r_0 = c, r_1, .. are any floats ("free rows"): r_i misses
-r_(i-1) AA by a defect that meets the box of xi. Proposed by powers of AA, believed by the defect. Trusted: yes.
+An output is a row c of xi = (e, zeta, v_1..v_(q+1), eta). Rows r_0 = c, r_1, .. are any floats ("free rows"): r_i
+misses r_(i-1) AA by a defect that meets the box of xi. Proposed by powers of AA, believed by the defect. Trusted: yes.
 Implements: theory of the sampled loop, section 3.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from math import ceil
 from typing import Final
 
@@ -26,7 +27,7 @@ _ROOT_TINY: Final = 1e-150
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Flow:
-    """Where e is after a time s in a sample, by the parts of xi: `core` (n, a), `eta` (n, r); `n` and `r_u` directly."""
+    """e at a time s of a sample, by the parts of xi: `core` (n, a), `eta` (n, r); of n and r_u directly."""
 
     core: Known
     eta: Known
@@ -116,7 +117,9 @@ class Dynamics:
         first[: self.m] = np.hstack([c.N, c.M])
         lower = np.block([[np.hstack([c.G, c.F]), np.zeros((self.z, past))], [first, shift]])
         eta = np.zeros((self.core_size - self.n, self.loop.H.shape[1]))
-        return Known.stacked([[flow.core], [Known.exact(lower)]]), Known.stacked([[flow.eta], [Known.exact(eta)]])
+        return Known.stacked([[flow.core], [Known.exact(lower)]]), Known.stacked(
+            [[flow.eta], [Known.exact(eta)]]
+        )
 
     def discrete(self) -> Known:
         """How n, r_u and r_z enter at a sample, (a, n + m + z)."""
@@ -150,7 +153,7 @@ class Kernel:
         self.columns = K.shape[1]
         self._at: list[tuple[float, Known]] = []
         bent = np.zeros_like(K)
-        for a, b in zip(ends, ends[1:], strict=False):
+        for a, b in pairwise(ends):
             d = fraction_bounds(b - a)[1]
             for s in (a, b):
                 phi, whole = exponential.at(s)
@@ -185,9 +188,9 @@ def swelling(A: Array, s: Fraction) -> Array:
 class Responses:
     """The answers of all outputs over `lags` L; rows are those of e at every node of a sample, delta, zeta.
 
-    Sums over lags 0..k-1 stand at index k, k = 0..L: `noise`, `wind` (L + 1, rows), `rounding` (L + 1, rows, n + m + z),
-    `rho` (L + 1, rows, n + m), `rate` and `size` (L + 1, rows, r). `rows` (L + 1, R, a) and `eta` (L + 1, R, r) are the
-    free rows themselves; `missed_core`, `missed_eta` all that they miss, summed, with the radii of the outputs.
+    Sums over lags 0..k-1 stand at index k, k = 0..L: `noise`, `wind` (L + 1, R), `rounding` (L + 1, R, n + m + z),
+    `rho` (L + 1, R, n + m), `rate` and `size` (L + 1, R, r). `rows` (L + 1, R, a) and `eta` (L + 1, R, r) are the free
+    rows themselves; `missed_core`, `missed_eta` all that they miss, summed, with the radii of the outputs.
     """
 
     def __init__(self, loop: Loop, controller: Controller, *, lags: int, pieces: int, panels: int) -> None:

@@ -173,7 +173,7 @@ class Loop:
 
     @cached_property
     def H(self) -> Array:
-        """How eta enters, (n, r): h by the columns of B, a disturbance with a rate by those of E, parameters by rows."""
+        """How eta enters, (n, r): h by columns of B, a disturbance with a rate by those of E, parameters by rows."""
         own = self.B[:, [] if self.jumps else list(self.matched)]
         swaying = self.E if self.sways else self.E[:, :0]
         rows = self.unknown if self.slow else ()

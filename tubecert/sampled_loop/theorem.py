@@ -8,9 +8,10 @@ possible (theory of the sampled loop, theorem 5). Who proposed tables, tube and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -32,7 +33,9 @@ from tubecert.verdict import Verdict
 
 MOST_LAGS: Final = 50_000
 MOST_PARTS: Final = 64
-_FLUSHED: Final = 1e-35  # what a computer may lose that has no subnormal numbers, z + n <= 400 products and sums
+_FLUSHED: Final = (
+    1e-35  # what a computer may lose that has no subnormal numbers, z + n <= 400 products and sums
+)
 _INDEX = NDArray[np.intp]
 
 
@@ -78,17 +81,32 @@ class Inequalities:
     def __init__(
         self, loop: Loop, controller: Controller, recipe: Recipe, starts: Sequence[int], responses: Responses
     ) -> None:
-        self.loop, self.controller, self.recipe, self.starts = loop, controller, recipe, tuple(starts)
+        self.loop, self.controller, self.starts = loop, controller, tuple(starts)
         self.responses = responses
         self.remainders = Remainders(loop, recipe.windows)
         n, m, z = loop.states, loop.inputs, controller.size
         self._outputs = np.concatenate(
             [np.tile(np.arange(n), len(responses.nodes)), np.arange(n, n + m + z)]
         )  # which of e, delta, zeta a row is about
-        cuts = np.array(recipe.cuts, dtype=np.intp).reshape(n + m + z, -1)
+        self._cut(recipe)
+
+    def again(
+        self, *, starts: Sequence[int] | None = None, cuts: tuple[tuple[int, ...], ...] | None = None
+    ) -> Inequalities:
+        """The same with other stages or other cuts; what is common is not computed again."""
+        found = copy(self)
+        found.starts = self.starts if starts is None else tuple(starts)
+        if cuts is not None:
+            found._cut(replace(self.recipe, cuts=cuts))
+        return found
+
+    def _cut(self, recipe: Recipe) -> None:
+        self.recipe = recipe
+        outputs = self.loop.states + self.loop.inputs + self.controller.size
+        cuts = np.array(recipe.cuts, dtype=np.intp).reshape(outputs, -1)
         self._cuts = cuts[self._outputs]  # (rows, r)
 
-    @cached_property
+    @property
     def last(self) -> int:
         """The last sample whose inequality is written down; that of a later one is the same."""
         whole = self.starts[-1] + self.loop.whole + 1 + self.recipe.lags
@@ -275,7 +293,7 @@ def check(
     with np.errstate(all="ignore"):  # what is not finite bounds nothing
         found = inequalities.of(above)
     lacks = [*_short(loop, found, below), *_domain(loop, inequalities, above), *_wishes(loop, stages)]
-    if isinstance(loop.slow, bool) and loop.slow and loop.unknown and not inequalities.remainders.smooth:
+    if loop.slow and loop.unknown and not inequalities.remainders.smooth:
         lacks.append(Lack(kind="not_proven"))
     inputs, over = _inputs(loop, inequalities.remainders, above)
     clearance = cleared(loop, above.W, starts)
@@ -303,7 +321,7 @@ def _sound(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: 
         and 1 <= recipe.pieces <= MOST_PARTS
         and 1 <= recipe.panels <= MOST_PARTS
         and starts[:1] == [0]
-        and all(a < b for a, b in zip(starts, starts[1:], strict=False))
+        and all(a < b for a, b in pairwise(starts))
         and (loop.samples is None or starts[-1] < loop.samples)
         and all(len(own.memory) == z for own in stages)
         and len(recipe.cuts) == n + m + z
@@ -314,7 +332,9 @@ def _sound(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: 
 
 def _short(loop: Loop, found: Boxes, claimed: Boxes) -> list[Lack]:
     """(a), (b), (c): strict for the error, which is what a first exit is about."""
-    holds = bool((found.W < claimed.W).all() and (found.U <= claimed.U).all() and (found.Z <= claimed.Z).all())
+    holds = bool(
+        (found.W < claimed.W).all() and (found.U <= claimed.U).all() and (found.Z <= claimed.Z).all()
+    )
     if holds:
         return []
     short = np.max(np.where(found.W < claimed.W, 0.0, 1.0), axis=0)
@@ -342,7 +362,10 @@ def _wishes(loop: Loop, stages: Sequence[Stage]) -> list[Lack]:
     lacks = []
     for name, wish in loop.spec.tube.half_widths:
         widths = [
-            sum(abs(factor) * own.half_widths[state] for factor, state in zip(rows[name], loop.model.states, strict=True))
+            sum(
+                abs(factor) * own.half_widths[state]
+                for factor, state in zip(rows[name], loop.model.states, strict=True)
+            )
             for own in stages
         ]
         if (most := max(widths)) > wish:

@@ -1,0 +1,162 @@
+"""Tables -> stages and a recipe for the theorem: the fixed point of its own inequalities, from below.
+
+Untrusted: what is proposed here is examined by `sampled_loop.theorem.check`, which may say no.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Final
+
+import numpy as np
+
+from tubecert.digits import up
+from tubecert.enclosure.interval import Array
+from tubecert.sampled_loop.record import Recipe, Stage
+from tubecert.sampled_loop.responses import Dynamics, Responses
+from tubecert.sampled_loop.setting import Controller, Loop
+from tubecert.sampled_loop.theorem import MOST_LAGS, Boxes, Inequalities
+
+_FORGOTTEN: Final = 1e-5  # what is left of the oldest sample that counts
+_FEWEST: Final = 8
+_WINDOWS: Final = 256
+_PARTS: Final = (2, 4, 8, 16)
+_SETTLED: Final = 5e-3  # finer pieces that gain less are not worth it
+_STEPS: Final = 60
+_LARGE: Final = 1e6
+_STEADY: Final = 0.97  # a first stage that is this near to the last is the only one
+_STAGES: Final = (64, 32, 16, 8, 4, 2, 1)
+_DIGITS: Final = 5
+
+Report = Callable[[int, Array], None]
+
+
+class NoTubeError(ValueError):
+    """The inequalities have no fixed point that was found; `W` is what they came to, (n,)."""
+
+    def __init__(self, W: Array) -> None:
+        super().__init__("no fixed point")
+        self.W = W
+
+
+def propose(loop: Loop, controller: Controller, report: Report | None = None) -> tuple[Inequalities, tuple[Stage, ...]]:
+    """Stages that should hold, with the inequalities that say so. Raises `NoTubeError`."""
+    recipe = Recipe(
+        lags=_lags(loop, controller),
+        cuts=(),
+        pieces=_PARTS[0],
+        panels=_PARTS[0],
+        windows=_WINDOWS,
+        parameters="slow" if loop.slow else "sudden",
+    )
+    found = _solved(loop, controller, recipe, report)
+    for parts in _PARTS[1:]:
+        finer = _solved(loop, controller, replace(recipe, pieces=parts, panels=parts), report)
+        gained = np.max(1 - finer[1].W / np.maximum(found[1].W, 1e-300))
+        if gained < _SETTLED:
+            break
+        found = finer
+    inequalities, boxes = found
+    return inequalities, _stages(loop, boxes, inequalities.starts)
+
+
+def _lags(loop: Loop, controller: Controller) -> int:
+    """After how many samples nothing is left of xi; all samples of a plan that ends before."""
+    step, _ = Dynamics(loop, controller).step()
+    slowest = float(np.max(np.abs(np.linalg.eigvals(step.mid)), initial=0.0))
+    most = MOST_LAGS if loop.samples is None else max(1, loop.samples)
+    if slowest >= 1:
+        return min(most, MOST_LAGS)
+    wanted = np.log(_FORGOTTEN) / np.log(max(slowest, 1e-3))
+    return int(min(most, max(_FEWEST, np.ceil(wanted) + 2 * (loop.whole + 2))))
+
+
+def _solved(
+    loop: Loop, controller: Controller, recipe: Recipe, report: Report | None
+) -> tuple[Inequalities, Boxes]:
+    """The fixed point with as many stages as the start asks for."""
+    made = Responses(loop, controller, lags=recipe.lags, pieces=recipe.pieces, panels=recipe.panels)
+    rough = Inequalities(loop, controller, _uncut(loop, controller, recipe), (0,), made)
+    rough = rough.again(cuts=_cuts(rough, made))
+    if not loop.start.reach.any() and not loop.matched:
+        return rough, _fixed_point(rough, report)
+    starts = sorted({0, *(recipe.lags // part for part in _STAGES if recipe.lags // part > loop.whole)})
+    if loop.samples is not None:
+        starts = [k for k in starts if k < loop.samples]
+    several = rough.again(starts=starts)
+    boxes = _fixed_point(several, report)
+    if (boxes.W[-1] >= _STEADY * boxes.W[0]).all() and (boxes.U[-1] >= _STEADY * boxes.U[0]).all():
+        return rough, _fixed_point(rough, report)
+    return several, boxes
+
+
+def _uncut(loop: Loop, controller: Controller, recipe: Recipe) -> Recipe:
+    outputs = loop.states + loop.inputs + controller.size
+    return replace(recipe, cuts=((recipe.lags,) * loop.H.shape[1],) * outputs)
+
+
+def _cuts(inequalities: Inequalities, made: Responses) -> tuple[tuple[int, ...], ...]:
+    """The lag from which on eta's size costs less than its rate, for every output and component."""
+    n = inequalities.loop.states
+    nothing = _nothing(inequalities)
+    _, sizes = inequalities.phases(nothing)
+    first = made.count - (made.count - n * len(made.nodes))  # rows of e at the last node, then delta and zeta
+    rows = np.r_[first - n : first, first : made.count]
+    cost = (
+        made.rate[:, rows] * sizes.rate
+        + np.abs(made.eta[:, rows]) * sizes.size
+        - made.size[:, rows] * sizes.size
+    )
+    with np.errstate(all="ignore"):
+        best = np.argmin(np.where(np.isfinite(cost), cost, np.inf), axis=0)
+    return tuple(tuple(int(cut) for cut in row) for row in best.reshape(len(rows), -1))
+
+
+def _nothing(inequalities: Inequalities) -> Boxes:
+    loop, stages = inequalities.loop, len(inequalities.starts)
+    return Boxes(
+        np.zeros((stages, loop.states)),
+        np.zeros((stages, loop.inputs)),
+        np.zeros((stages, inequalities.controller.size)),
+    )
+
+
+def _fixed_point(inequalities: Inequalities, report: Report | None) -> Boxes:
+    """The least boxes that the inequalities map into themselves, by going up from nothing."""
+    boxes = _nothing(inequalities)
+    widest = np.array([float(high - low) for low, high in inequalities.loop.spec.safe_set])
+    with np.errstate(all="ignore"):
+        for step in range(_STEPS):
+            found = inequalities.of(boxes)
+            if report is not None:
+                report(step, found.W[-1])
+            if not np.isfinite(found.W).all() or (found.W > widest).any():
+                raise NoTubeError(found.W[0])
+            settled = all(
+                (new <= old * (1 + 1e-4) + 1e-300).all()
+                for new, old in ((found.W, boxes.W), (found.U, boxes.U), (found.Z, boxes.Z))
+            )
+            if settled:
+                return found
+            boxes = found
+    raise NoTubeError(boxes.W[0])
+
+
+def _stages(loop: Loop, boxes: Boxes, starts: Sequence[int]) -> tuple[Stage, ...]:
+    """A thousandth wider, as decimals."""
+
+    def rounded(values: Array) -> list[Fraction]:
+        return [Fraction(up(float(value) * (1 + 1e-3) + 1e-30, _DIGITS)) for value in values]
+
+    model = loop.model
+    return tuple(
+        Stage(
+            start=start,
+            half_widths=dict(zip(model.states, rounded(W), strict=True)),
+            deviations=dict(zip(model.inputs, rounded(U), strict=True)),
+            memory=tuple(rounded(Z)),
+        )
+        for start, W, U, Z in zip(starts, boxes.W, boxes.U, boxes.Z, strict=True)
+    )
