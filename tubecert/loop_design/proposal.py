@@ -41,7 +41,9 @@ class NoTubeError(ValueError):
         self.W = W
 
 
-def propose(loop: Loop, controller: Controller, report: Report | None = None) -> tuple[Inequalities, tuple[Stage, ...]]:
+def propose(
+    loop: Loop, controller: Controller, report: Report | None = None
+) -> tuple[Inequalities, tuple[Stage, ...]]:
     """Stages that should hold, with the inequalities that say so. Raises `NoTubeError`."""
     recipe = Recipe(
         lags=_lags(loop, controller),
@@ -132,7 +134,7 @@ def _fixed_point(inequalities: Inequalities, report: Report | None) -> Boxes:
             found = inequalities.of(boxes)
             if report is not None:
                 report(step, found.W[-1])
-            if not np.isfinite(found.W).all() or (found.W > widest).any():
+            if not np.isfinite(found.W).all() or (widest < found.W).any():
                 raise NoTubeError(found.W[0])
             settled = all(
                 (new <= old * (1 + 1e-4) + 1e-300).all()

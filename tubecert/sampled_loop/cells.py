@@ -139,12 +139,13 @@ def _along(loop: Loop, count: int) -> Array | None:
 def largest_jump(loop: Loop) -> Array:
     """What u* held between knots differs by, at most, within one sample that does not begin at a knot; (m,).
 
-    Nothing, if every knot is an instant at which commands begin to act.
+    Nothing, if every knot is an instant at which commands begin to act; but at the left end of an interval a computer's
+    time may be that of the interval before.
     """
     knots = loop.plan.knots
     assert knots is not None
     inner = knots.t[1:-1] if loop.afterwards != "repeat" else knots.t[1:]
-    if all(((t - loop.rest) / loop.sample_time).denominator == 1 for t in inner):
+    if loop.hold == "middle" and all(((t - loop.rest) / loop.sample_time).denominator == 1 for t in inner):
         return np.zeros(loop.inputs)
     closest = min(b - a for a, b in zip(knots.t, knots.t[1:], strict=False))
     met = int(loop.sample_time / closest) + 1

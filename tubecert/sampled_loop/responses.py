@@ -46,7 +46,7 @@ class Direct:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """A part of a sample between two nodes, and how far e is there from the chord (theory, lemma 3.3)."""
+    """A part of a sample between two nodes, and how far e is there from the chord (theory, eq. 3.4)."""
 
     first: int
     core: Array
@@ -143,7 +143,7 @@ class Kernel:
     """int_0^T |r G(s)| ds of rows r (.., n) for G = Phi K or J K, by the trapezoid, from above.
 
     On a part of length d the integral is at most that of the chord, d (|r G(a)| + |r G(b)|)/2, and d^3/12 sup|r G''|;
-    G'' is A^2 Phi K or A Phi K, and |Phi(s - mid)| <= e^(|A| d/2) entry by entry (theory, lemma 3.2). A length in place
+    G'' is A^2 Phi K or A Phi K, and |Phi(s - mid)| <= e^(|A| d/2) entry by entry (theory, eq. 3.5). A length in place
     of components: its norms are convex as well.
     """
 

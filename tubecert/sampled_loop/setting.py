@@ -58,7 +58,7 @@ class Start:
         return np.asarray((self.known.above[:, 0] + self.box + self.length) * (1 + 1e-15))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Loop:
     """The sampled loop about its plan; A (n, n), B (n, m), E (n, k) are any floats.
 

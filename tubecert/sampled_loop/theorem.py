@@ -17,10 +17,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert import digits
 from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.enclosure.outward import number_above, number_below
 from tubecert.enclosure.processor import require_ieee
-from tubecert.records import exact_json
 from tubecert.sampled_loop.cells import MOST
 from tubecert.sampled_loop.midrad import SUMMED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
@@ -36,6 +36,7 @@ MOST_PARTS: Final = 64
 _FLUSHED: Final = (
     1e-35  # what a computer may lose that has no subnormal numbers, z + n <= 400 products and sums
 )
+_DIGITS: Final = 7
 _INDEX = NDArray[np.intp]
 
 
@@ -390,5 +391,5 @@ def _inputs(loop: Loop, remainders: Remainders, boxes: Boxes) -> tuple[tuple[Inp
 
 
 def _outward(low: float, high: float) -> tuple[Fraction, Fraction]:
-    """Decimals beside two floats, as a certificate writes them."""
-    return Fraction(exact_json(Fraction(repr(low)))), Fraction(exact_json(Fraction(repr(high))))
+    """Decimals beside two floats."""
+    return Fraction(digits.down(low, _DIGITS)), Fraction(digits.up(high, _DIGITS))
