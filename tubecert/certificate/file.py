@@ -11,7 +11,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -28,7 +28,7 @@ KIND: Final = Kind(
 STDOUT = "-"
 REMEDY = "choose another file with -o FILE, or -o - for stdout"
 
-_VERSIONED = re.compile(r"tubecert-certificate/\d{1,9}", re.ASCII)
+_VERSIONED = re.compile(r"tubecert-(certificate|sampled-loop)/\d{1,9}", re.ASCII)
 
 
 def canonical_bytes(data: Any) -> bytes:
@@ -54,18 +54,18 @@ def dump(certificate: Mapping[str, Any]) -> str:
     return printable_json(text) + "\n"
 
 
-def load(path: str) -> dict[str, Any]:
-    """The certificate in a file (`-`: on stdin), if its format is known and its hash is that of its result.
+def load(path: str, formats: Collection[str] = (FORMAT,)) -> dict[str, Any]:
+    """The certificate in a file (`-`: on stdin), if its format is one of these and its hash is that of its result.
 
     Raises `TargetError` for anything else. What the result says is not examined here.
     """
-    certificate = parse(read_stdin(KIND) if path == STDIN else read(path, KIND), path)
+    certificate = parse(read_stdin(KIND) if path == STDIN else read(path, KIND), path, formats)
     if certificate.get("hash") != digest(certificate["result"]):
         raise foreign(path, "was changed after it had been written: its hash is not that of its result")
     return certificate
 
 
-def parse(data: bytes, name: str) -> dict[str, Any]:
+def parse(data: bytes, name: str, formats: Collection[str] = (FORMAT,)) -> dict[str, Any]:
     """The certificate that bytes say; its hash is not compared. Raises `TargetError`."""
     try:
         certificate = json.loads(data.decode(), parse_constant=_no_number, object_pairs_hook=_once)
@@ -82,8 +82,8 @@ def parse(data: bytes, name: str) -> dict[str, Any]:
     known = certificate.get("format") if isinstance(certificate, dict) else None
     if not isinstance(known, str) or not _VERSIONED.fullmatch(known):
         raise foreign(name, f"is not a certificate ({FORMAT})")
-    if known != FORMAT:
-        message = f"{visible(name)} has the format {known}; this version reads {FORMAT}"
+    if known not in formats:
+        message = f"{visible(name)} has the format {known}; what is read here is {' or '.join(formats)}"
         raise TargetError([Finding(code="TC602", message=message, help="certify again")])
     if not isinstance(certificate.get("result"), dict):
         raise incomplete(name, "it has no result")
