@@ -87,11 +87,17 @@ def certificate(**changes: object) -> Certificate:
     """The certificate of the cart; `changes` are fields of its result."""
     result = Result(
         verdict=Verdict.CERTIFIED,
-        spec=Source(effective=Effective.of(EFFECTIVE), effective_hash=digest(EFFECTIVE), file_hash="sha256:0"),
+        spec=Source(
+            effective=Effective.of(EFFECTIVE), effective_hash=digest(EFFECTIVE), file_hash="sha256:0"
+        ),
         claim=Claim(horizon=None, afterwards="nothing", hold="middle"),
         controller=Tables(F=matrix([0.5]), G=matrix([1.0, 0.0]), M=matrix([-2.0]), N=matrix([-4.0, -3.0])),
         tube=(_stage(0, "0.13201", "0.5", "3.1"), _stage(800, "0.034", "0.2", "1.2")),
-        inputs=(InputUse(input="F", range=(Fraction("-3.1"), Fraction("3.1")), limits=(Fraction(-8), Fraction(8))),),
+        inputs=(
+            InputUse(
+                input="F", range=(Fraction("-3.1"), Fraction("3.1")), limits=(Fraction(-8), Fraction(8))
+            ),
+        ),
         clearance=(Cleared(index=1, verdict=Verdict.CERTIFIED),),
     )
     notes = Notes(
@@ -108,4 +114,6 @@ def certificate(**changes: object) -> Certificate:
 
 def undecided(*lacks: Lack) -> Certificate:
     """The same where nothing was proven."""
-    return certificate(verdict=Verdict.UNDECIDED, tube=(), inputs=(), clearance=(), controller=None, lacks=lacks)
+    return certificate(
+        verdict=Verdict.UNDECIDED, tube=(), inputs=(), clearance=(), controller=None, lacks=lacks
+    )

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from tubecert.certificate.result import Plans, Result
+from tubecert.certificate.effective import SystemView, Tree
 from tubecert.digits import end, short
-from tubecert.enclosure.constant import Witness
+from tubecert.records import to_json
+
+if TYPE_CHECKING:
+    from tubecert.certificate.result import Plans, Result
+    from tubecert.enclosure.constant import Witness
 
 NOT_RECHECKED = (
     "Not rechecked: this is what the certificate says; whether it is true, tubecert recheck examines."
@@ -27,18 +32,23 @@ def plan_words(result: Result) -> str:
 
 def start_words(result: Result) -> str:
     """Where the state starts: `at q = 0.1, all else 0`, `anywhere with q in [-0.1, 0.1]`, `within 0.1 of ...`."""
-    start = result.claim.start
-    if start.within is not None:
-        whose = "the plan" if result.claim.plans is None else "its plan"
-        return f"within {end(Fraction(start.within))} of the start of {whose}"
-    system = result.spec.effective.system
-    sides = start.box or {name: (at, at) for name, at in zip(system.states, start.at or (), strict=False)}
+    start, whose = result.claim.start, "the plan" if result.claim.plans is None else "its plan"
+    return started(to_json(start), result.spec.effective.system, whose)
+
+
+def started(told: Mapping[str, Tree], system: SystemView, whose: str) -> str:
+    """The same of canonical data, where a start is within a length, in a box, or at a point."""
+    if "within" in told:
+        return f"within {end(Fraction(told['within']))} of the start of {whose}"
+    sides = told.get("box") or {
+        name: (at, at) for name, at in zip(system.states, told.get("at", ()), strict=False)
+    }
     places = {name: _place(*ends) for name, ends in sides.items() if set(ends) != {"0"}}
-    told = [f"{name} {where} {system.units.get(name, '')}".rstrip() for name, where in places.items()]
-    if len(told) < len(sides):
-        told.append("all else 0" if told else "0")
+    said = [f"{name} {where} {system.units.get(name, '')}".rstrip() for name, where in places.items()]
+    if len(said) < len(sides):
+        said.append("all else 0" if said else "0")
     wide = any(where.startswith("in") for where in places.values())
-    return f"{'anywhere with' if wide else 'at'} {', '.join(told)}"
+    return f"{'anywhere with' if wide else 'at'} {', '.join(said)}"
 
 
 def _place(low: str, high: str) -> str:

@@ -6,56 +6,15 @@ In: `result` of a certificate. Out: one figure per state and per input. Nothing 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Result
 from tubecert.report import planned
-from tubecert.report.figures_axes import Axis, Chart, Point
-from tubecert.report.figures_tube import is_near, view
+from tubecert.report.figures_axes import Point
+from tubecert.report.figures_band import Drawing
 from tubecert.report.outline import widths
 from tubecert.report.page import Figure
-
-_HEIGHT = 190
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Drawing:
-    """A curve of the plan, the band around it that is proven (below, above), and the limits of the quantity."""
-
-    key: str
-    name: str
-    unit: str
-    curve: Sequence[Point]
-    band: tuple[list[Point], list[Point]] | None
-    limits: Point | None
-    words: tuple[str, str, str]  # of the limits, the band, the curve
-
-    def figure(self, style: str) -> Figure:
-        """The figure; `style` is that of the band."""
-        label = f"{self.name} ({self.unit})" if self.unit else self.name
-        below, above = self.band or ([], [])
-        shown = [value for _, value in [*self.curve, *below, *above]]
-        safe = self.limits or (shown[0], shown[0])
-        y = view(shown, safe, label, near=is_near(shown, safe))
-        time = Axis(label="t (s)", low=self.curve[0][0], high=self.curve[-1][0])
-        chart = Chart(self.key, f"{self.name} over time", time, y, height=_HEIGHT)
-        if self.limits is not None:
-            chart.box((time.low, y.low), (time.high, y.high), "outside")
-            chart.box((time.low, self.limits[0]), (time.high, self.limits[1]), "safe")
-        if self.band is not None:
-            chart.area([*above, *reversed(below)], style)
-        chart.line(self.curve, "plan")
-        return Figure(
-            key=self.key, title=f"{self.name} over time", svg=chart.text(), legend=self._legend(style)
-        )
-
-    def _legend(self, style: str) -> tuple[tuple[str, str], ...]:
-        drawn = (("safe", self.limits), (style, self.band), ("plan", self.curve))
-        return tuple(
-            (key, words) for (key, part), words in zip(drawn, self.words, strict=True) if part is not None
-        )
 
 
 def state_figures(result: Result) -> list[Figure]:
@@ -64,7 +23,7 @@ def state_figures(result: Result) -> list[Figure]:
     inside = result.tube is not None and result.tube.rho_r is not None
     words = ("safe set", "proven band" if inside else "tube, not proven to stay in the safe set", "plan")
     drawings = [
-        _Drawing(
+        Drawing(
             key=f"state-{i}",
             name=name,
             unit=units.get(name, ""),
@@ -84,7 +43,7 @@ def input_figures(result: Result) -> list[Figure]:
     """Every input of the plan, and what is proven of it in the loop of what decides."""
     own, units = {each.input: each for each in result.inputs}, result.spec.effective.system.units
     drawings = [
-        _Drawing(
+        Drawing(
             key=f"input-{i}",
             name=name,
             unit=units.get(name, ""),

@@ -10,18 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tubecert.bounds.meanings import meaning
-from tubecert.certificate.effective import ObstacleView
 from tubecert.certificate.result import Result
 from tubecert.digits import near
 from tubecert.enclosure.constant import Witness
 from tubecert.report.claimed import point
 from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
+from tubecert.report.figures_band import draw_obstacle, is_near, view
 from tubecert.report.outline import Outline, domain_outline, tube_outline
 from tubecert.report.page import Figure
 from tubecert.words.claims import title as title_of
 
 _NEAR = 0.25  # places closer than this part of rho share a number
-_ZOOM = 4.0  # a safe set larger than this many tubes is shown in part
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,16 +52,6 @@ class Plane:
 
     def _label(self, i: int) -> str:
         return f"{self.names[i]} ({self.units[i]})" if self.units[i] else self.names[i]
-
-
-def is_near(shown: Sequence[float], safe: Point) -> bool:
-    """Whether values can be told apart beside the whole safe range."""
-    return not shown or safe[1] - safe[0] <= _ZOOM * (max(shown) - min(shown))
-
-
-def view(shown: Sequence[float], safe: Point, label: str, *, near: bool) -> Axis:
-    """An axis that shows some values, with or without the safe range."""
-    return Axis.around([*shown, *safe] if near else shown, label, pad=0.06 if near else 0.25)
 
 
 def planes(result: Result) -> list[Plane]:
@@ -158,19 +147,9 @@ def _obstacles(result: Result, plane: Plane, chart: Chart) -> list[tuple[str, st
     shown = []
     for obstacle in result.spec.effective.obstacles:
         if set(obstacle.states) == set(plane.names):
-            _obstacle(obstacle, plane, chart)
+            draw_obstacle(chart, obstacle, plane.names)
             shown = [("obstacle", "obstacle")]
     return shown
-
-
-def _obstacle(obstacle: ObstacleView, plane: Plane, chart: Chart) -> None:
-    a, b = (0, 1) if obstacle.states == plane.names else (1, 0)
-    if obstacle.disc is not None:
-        center, radius = obstacle.disc.center, float(obstacle.disc.radius)
-        chart.ellipse((float(center[a]), float(center[b])), (radius, radius), "obstacle")
-    else:
-        corners = [(float(corner[a]), float(corner[b])) for corner in obstacle.polygon]
-        chart.area(corners, "obstacle")
 
 
 # -- suprema

@@ -1,0 +1,154 @@
+"""What a certificate of a sampled loop says, in words: what is claimed, what it rests on, what is lacking.
+
+In: the records of the certificate. Out: sentences, which nothing reads again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from fractions import Fraction
+from typing import Final
+
+from tubecert.certificate.effective import Effective, Tree
+from tubecert.digits import end, short, up
+from tubecert.sampled_loop.record import Lack, Missing, Result, Shares
+from tubecert.verdict import Verdict
+
+SHARES: Final[Mapping[str, str]] = {
+    "noise": "noise",
+    "holding": "delay and holding",
+    "uncertainty": "h",
+    "wind": "wind",
+    "start": "start",
+    "remainder": "remainder",
+}
+_HELD: Final = {
+    "middle": "in the middle of the interval in which it acts",
+    "left": "where the interval begins in which it acts",
+}
+_WHY: Final[Mapping[Missing, str]] = {
+    "no_design": "no controller was found{mode}",
+    "no_fixed_point": "no tube closes: in {where} what is not linear grows faster than the tube",
+    "inputs": "the input {where} needs {needed} of {allowed}",
+    "safe_set": "the tube leaves the safe set: {where} needs {needed} of {allowed}",
+    "start": "the start is too far from the plan: {where} needs {needed} of {allowed}",
+    "obstacle": "the tube is not proven to keep away from obstacle {where}",
+    "undefined": "the equations are not defined everywhere in the tube ({where})",
+    "wish": "the half-width of {where} is {needed}, wished for: {allowed}",
+    "not_proven": "what was found in floats is not proven: {where} needs {needed} of {allowed}",
+}
+_HELP: Final[Mapping[Missing, str]] = {
+    "no_design": "an input or a sensor for that mode, a higher hardware.rate, or a shorter hardware.delay",
+    "no_fixed_point": "a nearer start, less noise, wind or h, a higher hardware.rate, or a plan that moves less",
+    "inputs": "wider limits, a plan that uses less of them, or less of what asks most: {largest}",
+    "safe_set": "a larger safe_set, a plan farther from its sides, or less of what fills the tube",
+    "start": "a nearer initial_state",
+    "obstacle": "a plan that passes it farther away, or a wish in tube.half_widths for the states of its plane",
+    "undefined": "a smaller safe_set that keeps away from there, or a narrower tube",
+    "wish": "a larger wish, or less of what fills the tube most: {largest}",
+    "not_proven": "a slightly smaller start, or less noise, wind or h",
+}
+_MODE: Final = ": a mode of {where} grows by {needed} a sample, and no input moves it or no sensor sees it"
+
+
+def promise(result: Result) -> str:
+    """What the verdict says, as a sentence without its subject."""
+    if result.verdict is Verdict.CERTIFIED:
+        return f"the state stays in the tube around {plan(result)} {extent(result)}"
+    return "; ".join(why(lack) for lack in result.lacks) or "nothing is proven"
+
+
+def plan(result: Result) -> str:
+    """What the tube is around."""
+    return "every plan of the family" if result.spec.effective.trajectory.kind == "any" else "the plan"
+
+
+def extent(result: Result) -> str:
+    """The time that is claimed."""
+    claim, last = result.claim, result.spec.effective.trajectory.horizon
+    if claim.horizon is not None:
+        return f"for 0 <= t <= {short(claim.horizon, 12)} s"
+    after = {"rest": "at rest at the end of the plan after", "repeat": "which is repeated every"}
+    told = after.get(claim.afterwards)
+    return "for all t >= 0" + (f", {told} {short(last, 12)} s" if told and last is not None else "")
+
+
+def why(lack: Lack) -> str:
+    """Why nothing is certified."""
+    numbers = {name: up(getattr(lack, name), 4) for name in ("needed", "allowed")}
+    mode = _MODE.format(where=lack.where, **numbers) if lack.where else ""
+    return _WHY[lack.kind].format(where=lack.where, mode=mode, **numbers)
+
+
+def remedy(lack: Lack, filled: Shares | None) -> str:
+    """What would help; `filled` is what fills the quantity that lacks."""
+    most = "" if filled is None else max(SHARES, key=lambda name: float(getattr(filled, name)))
+    return _HELP[lack.kind].format(largest=SHARES.get(most, "noise, wind, h or delay"))
+
+
+def percents(shares: Shares) -> dict[str, int]:
+    """Whole per cents by the words of the shares, which add up to 100; what is nothing is left out."""
+    parts = {SHARES[item.name]: float(getattr(shares, item.name)) for item in fields(shares)}
+    whole = sum(parts.values())
+    if whole <= 0:
+        return {}
+    exact = {name: 100 * part / whole for name, part in parts.items()}
+    found = {name: int(part) for name, part in exact.items()}
+    for name in sorted(exact, key=lambda name: found[name] - exact[name])[: 100 - sum(found.values())]:
+        found[name] += 1
+    return {name: part for name, part in found.items() if part}
+
+
+def filling(shares: Shares) -> str:
+    """The same in a row, the largest first."""
+    found = percents(shares)
+    return ", ".join(f"{name} {found[name]} %" for name in sorted(found, key=lambda name: -found[name]))
+
+
+def loop(effective: Effective) -> str:
+    """The computer and the sensors: `500 Hz, delay 0.0005 s, noise p 0.001 m`."""
+    own, units = effective.part("hardware"), effective.system.units
+    period = float(_number(own["sample_time"]))
+    rate = f"{short(1 / period, 6)} Hz" if period < 1 else f"every {short(period, 6)} s"
+    return f"{rate}, delay {_delay(own['delay'])}, noise {_noise(own['noise'], units)}"
+
+
+def assumed(result: Result) -> Iterator[str]:
+    """What the claim rests on and does not show."""
+    own, claim = result.spec.effective.part("hardware"), result.claim
+    yield "every state is measured at every sample, with an error within the noise, arbitrary from sample to sample"
+    yield "samples and inputs come exactly on time: the delay is the same for all, and nothing is lost"
+    if claim.hold in _HELD:
+        yield (
+            f"the computer holds the plan's input, taken {_HELD[claim.hold]}; before the first command acts, the "
+            "actuators hold the plan's input by the same rule, and the controller's own state is 0"
+        )
+        yield "a planner that changes its plan does so for times later than delay and sample time together"
+    else:
+        yield "the actuators follow the plan's input continuously; the controller's own state is 0 at the start"
+    arithmetic = own.get("arithmetic", "double")
+    yield f"the controller computes in {arithmetic} precision as IEEE 754 has it (C: compiled without -ffast-math)"
+    if any(len(each.ends) == 2 for each in result.spec.effective.system.parameters.values()):
+        yield "a parameter that has a range is constant, anywhere in its range"
+    if result.spec.effective.part("uncertainty").get("bounds"):
+        yield "the declared bounds of h and of its slopes hold"
+    if result.spec.effective.part("disturbance"):
+        yield "the wind is within its bound, and otherwise arbitrary"
+
+
+def _delay(told: str) -> str:
+    """A time, or words."""
+    return f"{end(_number(told))} s" if told[:1].isdigit() or told[:1] == "." else told
+
+
+def _noise(told: Tree, units: Mapping[str, str]) -> str:
+    """One length, or a size for each state."""
+    if not isinstance(told, Mapping):
+        return "0" if _number(told) == 0 else f"{end(_number(told))} (length)"
+    sizes = (f"{name} {end(_number(size))} {units.get(name, '')}".rstrip() for name, size in told.items())
+    return " ".join(", ".join(sizes).split())
+
+
+def _number(text: str) -> Fraction:
+    return Fraction(text)
