@@ -19,7 +19,7 @@ from tubecert.findings import Finding
 from tubecert.kinds import name_of
 from tubecert.report import figures_tube
 from tubecert.report.claimed import horizon
-from tubecert.report.figures_tube import Plane
+from tubecert.report.figures_scene import Plane
 from tubecert.report.gains import rows
 from tubecert.report.outline import widths
 

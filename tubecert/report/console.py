@@ -11,7 +11,7 @@ from tubecert.certificate.result import Certificate, Result
 from tubecert.claims.limits import InputWithinLimits
 from tubecert.report import claimed, reach, sections
 from tubecert.report.gains import deciding
-from tubecert.report.layout import indented, titled
+from tubecert.report.layout import VERDICTS, indented, titled
 from tubecert.report.outline import widths
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
@@ -19,7 +19,7 @@ from tubecert.words.claims import sentence
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-STYLES = {verdict: f"bold {color}" for verdict, color in sections.VERDICTS.items()}
+STYLES = {verdict: f"bold {color}" for verdict, color in VERDICTS.items()}
 
 
 def report(

@@ -12,7 +12,7 @@ from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Result
 from tubecert.report import planned
 from tubecert.report.figures_axes import Point
-from tubecert.report.figures_band import Drawing
+from tubecert.report.figures_scene import Drawing
 from tubecert.report.outline import widths
 from tubecert.report.page import Figure
 

@@ -6,52 +6,20 @@ In: `result` of a certificate. Out: one figure per pair of states. Nothing is de
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from tubecert.bounds.meanings import meaning
 from tubecert.certificate.result import Result
 from tubecert.digits import near
 from tubecert.enclosure.constant import Witness
 from tubecert.report.claimed import point
-from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
-from tubecert.report.figures_band import draw_obstacle, is_near, view
-from tubecert.report.outline import Outline, domain_outline, tube_outline
+from tubecert.report.figures_axes import Chart, Point
+from tubecert.report.figures_scene import Plane, draw_obstacle, scene
+from tubecert.report.outline import domain_outline, tube_outline
 from tubecert.report.page import Figure
 from tubecert.words.claims import title as title_of
 
 _NEAR = 0.25  # places closer than this part of rho share a number
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plane:
-    """What is known in the plane of two states: the plan, the tube and its domain at one time, the safe set."""
-
-    names: tuple[str, str]
-    units: tuple[str, str]
-    index: tuple[int, int]
-    plan: tuple[Point, ...]
-    tube: Outline | None
-    safe: tuple[Point, Point]
-
-    def of(self, x: Sequence[float]) -> Point:
-        """The two coordinates of a state."""
-        return float(x[self.index[0]]), float(x[self.index[1]])
-
-    def axes(self, marks: Sequence[Point]) -> tuple[Axis, Axis]:
-        """Axes that show the tube, the marks, and of the safe set as much as leaves the tube visible."""
-        shown = [self._shown(i, [mark[i] for mark in marks]) for i in (0, 1)]
-        safe = [(self.safe[0][i], self.safe[1][i]) for i in (0, 1)]
-        near = all(map(is_near, shown, safe))
-        first, second = (view(shown[i], safe[i], self._label(i), near=near) for i in (0, 1))
-        return first, second
-
-    def _shown(self, i: int, marks: list[float]) -> list[float]:
-        reach = 0.0 if self.tube is None else self.tube.reach[i]
-        return [p[i] + side for p in self.plan for side in (-reach, reach)] + marks
-
-    def _label(self, i: int) -> str:
-        return f"{self.names[i]} ({self.units[i]})" if self.units[i] else self.names[i]
 
 
 def planes(result: Result) -> list[Plane]:
@@ -98,9 +66,7 @@ def _tube(result: Result, plane: Plane) -> Figure:
         if (at := reason.at) is not None and len(at.x) > max(plane.index)
     ]
     proven = result.tube is not None and result.tube.rho_r is not None
-    chart, legend = _scene(
-        f"tube-{plane.index[0]}-{plane.index[1]}", plane, [p for p, _ in witnesses], proven
-    )
+    chart, legend = scene(f"tube-{plane.index[0]}-{plane.index[1]}", plane, [p for p, _ in witnesses], proven)
     for shown in _obstacles(result, plane, chart):
         legend.append(shown)
     if plane.plan:
@@ -111,36 +77,6 @@ def _tube(result: Result, plane: Plane) -> Figure:
     if witnesses:
         legend.append(("witness", "witness"))
     return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(dict.fromkeys(legend)))
-
-
-def _scene(
-    key: str, plane: Plane, marks: list[Point], proven: bool = True
-) -> tuple[Chart, list[tuple[str, str]]]:
-    """A chart with the safe set, the tube and the plan; and their legend."""
-    x, y = plane.axes(marks)
-    title = f"Plan and tube in the plane of {plane.names[0]} and {plane.names[1]}"
-    chart = Chart(key, title, x, y, height=_height(plane, x, y))
-    chart.box((x.low, y.low), (x.high, y.high), "outside")
-    chart.box(*plane.safe, "safe")
-    legend = [("safe", "safe set")]
-    if plane.plan and plane.tube is not None:
-        inner = chart if plane.tube.sides is None else chart.clipped(plane.plan, plane.tube.sides)
-        inner.sweep(plane.plan, plane.tube.turn, "tube" if proven else "unproven")
-        legend.append(
-            ("tube", "tube") if proven else ("unproven", "tube, not proven to stay in the safe set")
-        )
-    if len(plane.plan) > 1:
-        chart.line(plane.plan, "plan")
-        legend.append(("plan", "plan"))
-    return chart, legend
-
-
-def _height(plane: Plane, x: Axis, y: Axis) -> int:
-    """The height at which a circle is round, if both states have one unit and neither side gets too short."""
-    if plane.units[0] != plane.units[1]:
-        return HEIGHT
-    height = round((WIDTH - LEFT - RIGHT) * (y.high - y.low) / (x.high - x.low)) + TOP + BOTTOM
-    return min(max(height, 200), 420)
 
 
 def _obstacles(result: Result, plane: Plane, chart: Chart) -> list[tuple[str, str]]:
@@ -167,7 +103,7 @@ def suprema_figures(result: Result) -> list[Figure]:
             continue
         key = f"suprema-{plane.index[0]}-{plane.index[1]}"
         domain = replace(plane, tube=domain_outline(result, plane.index))
-        chart, _ = _scene(key, domain, [plane.of(x) for x in symbols])
+        chart, _ = scene(key, domain, [plane.of(x) for x in symbols])
         for place, found in _close(chart, plane, list(symbols)).items():
             words = "; ".join(f"{numbers[x]}: {', '.join(symbols[x])}" for x in found)
             chart.dot(place, "numbered", 8, words)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from tubecert.verdict import Verdict
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+VERDICTS: Final = {Verdict.CERTIFIED: "green", Verdict.REFUTED: "red", Verdict.UNDECIDED: "yellow"}
 
 
 def indented(item: RenderableType) -> Padding:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -20,32 +19,7 @@ from tubecert.coordinates import inverse
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, ExpressionError, free_symbols, parse, symbol
-
-Pair = tuple[float, float]
-Matrix = tuple[Pair, Pair]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outline:
-    """The image of the unit disc under `turn`, cut to `sides` on both sides of each coordinate, if any."""
-
-    turn: Matrix
-    sides: Pair | None = None
-
-    @property
-    def reach(self) -> Pair:
-        """How far it goes in each coordinate."""
-        first, second = (math.hypot(*row) for row in self.turn)
-        return (
-            (first, second) if self.sides is None else (min(first, self.sides[0]), min(second, self.sides[1]))
-        )
-
-    def points(self, number: int = 72) -> Array:
-        """Points (number, 2) around it."""
-        angle = np.linspace(0.0, 2 * np.pi, number + 1)[:-1]
-        around = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.array(self.turn).T
-        sides = np.array((np.inf, np.inf) if self.sides is None else self.sides)
-        return np.asarray(np.clip(around, -sides, sides))
+from tubecert.report.figures_scene import Matrix, Outline
 
 
 def widths(result: Result) -> dict[str, float] | None:

@@ -20,7 +20,7 @@ from tubecert.kinds import ALONE, DISTANCE, RATES
 from tubecert.kinds.alone import AloneData
 from tubecert.report.claimed import point
 from tubecert.report.gains import NAMES, Gains, rows
-from tubecert.report.layout import plain_table
+from tubecert.report.layout import VERDICTS, plain_table
 from tubecert.report.reach import input_lines, safe_set, tube_lines
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 Section = tuple[str, list["RenderableType"]]
-VERDICTS = {Verdict.CERTIFIED: "green", Verdict.REFUTED: "red", Verdict.UNDECIDED: "yellow"}
 
 
 def of(result: Result, *, verbose: bool) -> Iterator[Section]:

@@ -12,8 +12,7 @@ from tubecert.expression import free_symbols, parse, symbol
 from tubecert.printable import visible
 from tubecert.report.claimed import place
 from tubecert.report.cut import cut_short
-from tubecert.report.layout import indented, plain_table, titled
-from tubecert.report.sections import VERDICTS
+from tubecert.report.layout import VERDICTS, indented, plain_table, titled
 from tubecert.words.advice import advice
 from tubecert.words.claims import message, outcome
 

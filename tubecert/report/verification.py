@@ -18,8 +18,7 @@ from tubecert.enclosure.constant import Constant
 from tubecert.printable import printable_json, visible
 from tubecert.records import to_json
 from tubecert.report.claimed import place
-from tubecert.report.layout import indented
-from tubecert.report.sections import VERDICTS
+from tubecert.report.layout import VERDICTS, indented
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
 

@@ -109,9 +109,18 @@ def filling(shares: Shares) -> str:
 def loop(effective: Effective) -> str:
     """The computer and the sensors: `500 Hz, delay 0.0005 s, noise p 0.001 m`."""
     own, units = effective.part("hardware"), effective.system.units
-    period = float(_number(own["sample_time"]))
+    period = float(Fraction(own["sample_time"]))
     rate = f"{short(1 / period, 6)} Hz" if period < 1 else f"every {short(period, 6)} s"
     return f"{rate}, delay {_delay(own['delay'])}, noise {_noise(own['noise'], units)}"
+
+
+def family(effective: Effective) -> str:
+    """Which plans belong to a family."""
+    told = effective.part("trajectory")
+    sides = [(name, ends) for box in ("x", "u") for name, ends in told.get(box, {}).items()]
+    boxes = ", ".join(f"{name}* in [{', '.join(end(Fraction(at)) for at in ends)}]" for name, ends in sides)
+    rates = [f"|{name}*'| <= {end(Fraction(rate))}" for name, rate in told.get("input_rate", {}).items()]
+    return "; ".join([boxes, *rates, f"|x*' - f - B u*| <= {end(Fraction(told.get('defect', '0')))}"])
 
 
 def assumed(result: Result) -> Iterator[str]:
@@ -139,16 +148,12 @@ def assumed(result: Result) -> Iterator[str]:
 
 def _delay(told: str) -> str:
     """A time, or words."""
-    return f"{end(_number(told))} s" if told[:1].isdigit() or told[:1] == "." else told
+    return f"{end(Fraction(told))} s" if told[:1].isdigit() or told[:1] == "." else told
 
 
 def _noise(told: Tree, units: Mapping[str, str]) -> str:
     """One length, or a size for each state."""
     if not isinstance(told, Mapping):
-        return "0" if _number(told) == 0 else f"{end(_number(told))} (length)"
-    sizes = (f"{name} {end(_number(size))} {units.get(name, '')}".rstrip() for name, size in told.items())
+        return "0" if Fraction(told) == 0 else f"{end(Fraction(told))} (length)"
+    sizes = (f"{name} {end(Fraction(size))} {units.get(name, '')}".rstrip() for name, size in told.items())
     return " ".join(", ".join(sizes).split())
-
-
-def _number(text: str) -> Fraction:
-    return Fraction(text)

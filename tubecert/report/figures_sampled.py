@@ -1,0 +1,149 @@
+"""Figures of a sampled loop: states and inputs over time, planes with obstacles, what fills the tube.
+
+In: a certificate. Out: figures in floats; nothing is decided here. A family of plans has no curve to be drawn.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.report.figures_axes import WIDTH, Point, blank, path, text
+from tubecert.report.figures_scene import Drawing, Outline, Plane, draw_obstacle, scene
+from tubecert.report.page import Figure
+from tubecert.sampled_loop.record import Certificate, Result, Shares
+from tubecert.words.sampled_loop import SHARES, percents
+
+_FOR_EVER: Final = 1.0  # s that are drawn of a plan without an end, beyond the start of the last stage
+_LEFT, _ROW = 90, 30  # of the bars
+_STYLES: Final = dict(zip(SHARES.values(), ("n1", "n4", "n2", "n3", "n5", "n6"), strict=True))
+Band = tuple[Array, Array, Array]
+
+
+def period(result: Result) -> Fraction:
+    """The sample time in s."""
+    return Fraction(result.spec.effective.part("hardware")["sample_time"])
+
+
+def band(certificate: Certificate) -> Band:
+    """Times (K,) in s, the plan there (K, n), half-widths (K, n); where a later stage begins, a time occurs twice.
+
+    The plan is interpolated between the points that the notes have. Empty for a family, and without a tube.
+    """
+    result, notes = certificate.result, certificate.notes
+    states = result.spec.effective.system.states
+    if not (result.tube and notes.samples_t):
+        return np.zeros(0), np.zeros((0, len(states))), np.zeros((0, len(states)))
+    starts = [float(stage.start * period(result)) for stage in result.tube]
+    known = np.array(notes.samples_t)
+    last = (
+        max(known[-1], starts[-1] + _FOR_EVER)
+        if result.claim.horizon is None
+        else float(result.claim.horizon)
+    )
+    times = [
+        np.array([begin, *known[(known > begin) & (known < until)], until])
+        for begin, until in pairwise([*starts, max(last, starts[-1])])
+    ]
+    rows = [[float(stage.half_widths[name]) for name in states] for stage in result.tube]
+    t = np.concatenate(times)
+    x = np.stack([np.interp(t, known, column) for column in np.array(notes.samples_x).T], axis=1)
+    return t, x, np.repeat(rows, [len(each) for each in times], axis=0)
+
+
+def figures(certificate: Certificate) -> Iterator[Figure]:
+    """All of them, as far as there is something to draw."""
+    t, x, widths = band(certificate)
+    if t.size:
+        yield from (
+            each.figure("tube") for each in (*_states(certificate, t, x, widths), *_inputs(certificate, t))
+        )
+        yield from _planes(certificate.result, x, widths)
+    filled = {**certificate.notes.start, **certificate.notes.long_run, **certificate.notes.deviations}
+    if filled:
+        yield _bars(filled)
+
+
+def _states(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Drawing]:
+    effective = certificate.result.spec.effective
+    for i, name in enumerate(effective.system.states):
+        yield Drawing(
+            key=f"state-{i}",
+            name=name,
+            unit=effective.system.units.get(name, ""),
+            curve=_points(t, x[:, i]),
+            band=(_points(t, x[:, i] - widths[:, i]), _points(t, x[:, i] + widths[:, i])),
+            limits=_ends(effective.part("safe_set")[name]),
+            words=("safe set", "proven band", "plan"),
+        )
+
+
+def _inputs(certificate: Certificate, t: Array) -> Iterator[Drawing]:
+    units, notes = certificate.result.spec.effective.system.units, certificate.notes
+    for i, use in enumerate(certificate.result.inputs):
+        low, high = (_points(t, np.full(t.shape, float(end))) for end in use.range)
+        yield Drawing(
+            key=f"input-{i}",
+            name=use.input,
+            unit=units.get(use.input, ""),
+            curve=_points(t, np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])),
+            band=(low, high),
+            limits=None if use.limits is None else _ends(use.limits),
+            words=("limits", "proven range in the loop", "plan"),
+        )
+
+
+def _planes(result: Result, x: Array, widths: Array) -> Iterator[Figure]:
+    """The planes in which there are obstacles, with the widest tube."""
+    effective = result.spec.effective
+    states, units = effective.system.states, effective.system.units
+    for names in dict.fromkeys(obstacle.states for obstacle in effective.obstacles):
+        i, j = map(states.index, names)
+        a, b = map(float, widths[:, [i, j]].max(axis=0))
+        (left, right), (low, high) = (_ends(effective.part("safe_set")[name]) for name in names)
+        plane = Plane(
+            names=names,
+            units=(units.get(names[0], ""), units.get(names[1], "")),
+            index=(i, j),
+            plan=tuple(_points(x[:, i], x[:, j])),
+            tube=Outline(turn=((2 * a, 0.0), (0.0, 2 * b)), sides=(a, b)),
+            safe=((left, low), (right, high)),
+        )
+        chart, legend = scene(f"plane-{i}-{j}", plane, [])
+        for obstacle in effective.obstacles:
+            if set(obstacle.states) == set(names):
+                draw_obstacle(chart, obstacle, names)
+        shown = (*legend, ("obstacle", "obstacle"))
+        yield Figure(key=chart.key, title=", ".join(names), svg=chart.text(), legend=shown)
+
+
+def _bars(filled: Mapping[str, Shares]) -> Figure:
+    """A bar for each state in the long run and each input, of what fills it, as shares of the whole."""
+    title, used = "What fills the tube and the inputs", dict[str, None]()
+    svg = blank(title, _ROW * len(filled) + 10)
+    for row, (name, shares) in enumerate(filled.items()):
+        y, x = _ROW * row + 20, float(_LEFT)
+        text(svg, (_LEFT - 8, y + 4), name, "axis end")
+        for what, part in percents(shares).items():
+            end = x + part / 100 * (WIDTH - _LEFT - 10)
+            bar = ET.SubElement(
+                svg, "path", {"class": f"curve bar {_STYLES[what]}", "d": path([(x, y), (end, y)])}
+            )
+            ET.SubElement(bar, "title").text = f"{what} {part} %"
+            used[what], x = None, end
+    legend = tuple((_STYLES[what], what) for what in SHARES.values() if what in used)
+    return Figure(key="shares", title=title, svg=ET.tostring(svg, encoding="unicode"), legend=legend)
+
+
+def _points(x: Array, y: Array) -> list[Point]:
+    return list(zip(x.tolist(), y.tolist(), strict=True))
+
+
+def _ends(ends: tuple[Fraction | str, ...]) -> Point:
+    return float(Fraction(ends[0])), float(Fraction(ends[1]))

@@ -1,0 +1,179 @@
+"""A certificate of a sampled loop as a page: what a terminal shows first, figures, and what one may ask next.
+
+In: a certificate. Out: a `Page`, which terminals, HTML, Markdown and notebooks show. Bounds are rounded outward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Final
+
+from tubecert.digits import down, exact, short, up
+from tubecert.report.claimed import NOT_RECHECKED, started
+from tubecert.report.figures_sampled import figures, period
+from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Section, Table, Tile
+from tubecert.sampled_loop.record import Certificate, InputUse, Notes, Result
+from tubecert.verdict import Verdict
+from tubecert.words.sampled_loop import assumed, extent, family, filling, loop, plan, promise, remedy, why
+
+_MOST, _ROWS = 6, 4  # states of the first screen; where there are more than four, they stand side by side
+_TILES: Final = 4
+
+
+def page_of(certificate: Certificate) -> Page:
+    """The page of a certificate, whatever its verdict."""
+    result, notes = certificate.result, certificate.notes
+    units, drawn = result.spec.effective.system.units, tuple(figures(certificate))
+    table = [] if not result.tube else [_widths(result, result.spec.effective.system.states, notes)]
+    sections: dict[str, tuple[str, Sequence[Block]]] = {
+        "loop": ("The loop", [*_screen(result, notes)]),
+        "figures": ("Figures", [Figures(figures=drawn)] if drawn else []),
+        "tube": ("Half-widths, and what fills them", table),
+        "assumed": ("Assumed, not proven", [Items(items=tuple(assumed(result)))]),
+        "origin": ("Where it comes from", [_origin(certificate)]),
+    }
+    return Page(
+        name=result.spec.effective.name,
+        verdict=result.verdict,
+        summary=promise(result),
+        meaning=f"{_meaning(result)} {NOT_RECHECKED}",
+        tiles=tuple(
+            Tile(symbol=name, value=f"±{up(width)}", unit=units.get(name, ""), words="half-width")
+            for name, width in [*half_widths(result).items()][:_TILES]
+            if result.verdict is Verdict.CERTIFIED
+        ),
+        sections=tuple(
+            Section(key=key, title=title, blocks=tuple(blocks))
+            for key, (title, blocks) in sections.items()
+            if blocks
+        ),
+    )
+
+
+def half_widths(result: Result) -> dict[str, Fraction]:
+    """What is proven of every state at all times: the widest of all stages."""
+    names = result.spec.effective.system.states if result.tube else ()
+    return {name: max(stage.half_widths[name] for stage in result.tube) for name in names}
+
+
+def used(use: InputUse) -> Fraction | None:
+    """How much of the room between the middle of its limits and their ends an input may use; None without limits."""
+    if use.limits is None:
+        return None
+    middle, half = (use.limits[0] + use.limits[1]) / 2, (use.limits[1] - use.limits[0]) / 2
+    return max(use.range[1] - middle, middle - use.range[0]) / half
+
+
+def _meaning(result: Result) -> str:
+    if result.verdict is not Verdict.CERTIFIED:
+        return "This is neither proven nor refuted; it must not be relied on."
+    return (
+        f"With this controller ({loop(result.spec.effective)}) every state stays within its half-width of "
+        f"{plan(result)} {extent(result)} if it starts {_start(result)}, under the assumptions below."
+    )
+
+
+def _start(result: Result) -> str:
+    effective = result.spec.effective
+    whose = "its plan" if effective.trajectory.kind == "any" else "the plan"
+    return started(effective.part("initial_state"), effective.system, whose)
+
+
+def _screen(result: Result, notes: Notes) -> Iterator[Block]:
+    """What is seen first."""
+    plans = (
+        [("plans", family(result.spec.effective))] if result.spec.effective.trajectory.kind == "any" else []
+    )
+    yield _facts([("loop", loop(result.spec.effective)), *plans, ("start", _start(result))])
+    if result.tube:
+        yield _widths(result, _first(result))
+    if rows := [*_inputs(result), *_worst(result, notes), *_obstacles(result), *_lacking(result, notes)]:
+        yield _facts(rows)
+
+
+def _facts(rows: Sequence[tuple[str, str]]) -> Facts:
+    return Facts(facts=tuple((name, Cell(text=told)) for name, told in rows))
+
+
+def _first(result: Result) -> Sequence[str]:
+    """The states of the first screen: those with a wish, and others as far as there is room, in their order."""
+    names, wishes = result.spec.effective.system.states, result.spec.effective.tube.half_widths
+    chosen = sorted(names, key=lambda name: name not in wishes)[:_MOST]
+    return [name for name in names if name in chosen]
+
+
+def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) -> Table:
+    """Half-widths at the start, in the long run, as wished; `notes` say what fills them, inputs as well."""
+    system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
+    stages = result.tube if notes or len(result.tube) < 2 else (result.tube[0], result.tube[-1])
+    filled = {**notes.start, **notes.long_run, **notes.deviations} if notes else {}
+    when = (f"t >= {short(stage.start * period(result), 4)} s" for stage in stages)
+    grid = [["half-widths", *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
+    for name in (*names, *(system.inputs if notes else ())):
+        widths = [up(stage.half_widths.get(name, stage.deviations.get(name))) for stage in stages]
+        row = [f"{name} ({system.units[name]})" if system.units.get(name) else name, *widths]
+        row += [exact(wishes[name]) if name in wishes else ""] if wishes else []
+        grid.append([*row, filling(filled[name])] if filled else row)
+    if len(names) > _ROWS and not notes:
+        grid = [[*column] for column in zip(*grid, strict=True)]
+    rows = [
+        tuple(Cell(text=told, kind="number" if i else "text") for i, told in enumerate(row))
+        for row in grid[1:]
+    ]
+    left = len(system.states) - len(names)
+    return Table(columns=tuple(grid[0]), rows=tuple(rows), note=f"{left} more with -v" if left else "")
+
+
+def _inputs(result: Result) -> Iterator[tuple[str, str]]:
+    units = result.spec.effective.system.units
+    for use in result.inputs:
+        told = f"{down(use.range[0])} to {up(use.range[1])} {units.get(use.input, '')}".rstrip()
+        if use.limits is not None and (share := used(use)) is not None:
+            told += (
+                f" of {exact(use.limits[0])} to {exact(use.limits[1])}: {up(100 * share, 3)} % of the room"
+            )
+        yield use.input, told
+
+
+def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
+    """What fills the tube of the state that is widest beside its wish, or else beside the safe set."""
+    wishes, safe = result.spec.effective.tube.half_widths, result.spec.effective.part("safe_set")
+    sizes = {
+        name: width / (wishes[name] if wishes else Fraction(safe[name][1]) - Fraction(safe[name][0]))
+        for name, width in (result.tube[-1].half_widths.items() if result.tube else ())
+        if name in notes.long_run and name in (wishes or safe)
+    }
+    if sizes:
+        name = max(sizes, key=lambda name: sizes[name])
+        yield f"fills {name}", filling(notes.long_run[name])
+
+
+def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
+    missed = [str(each.index) for each in result.clearance if each.verdict is not Verdict.CERTIFIED]
+    if missed:
+        yield "obstacles", f"not proven to keep away from number {', '.join(missed)}"
+    elif result.clearance:
+        yield "obstacles", f"the tube keeps away from {'all of them' if len(result.clearance) > 1 else 'it'}"
+
+
+def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
+    """What fills that which lacks, and what would help; of a certified tube also which wish it misses."""
+    for lack in result.lacks:
+        shares = {**notes.start, **notes.long_run, **notes.deviations}.get(lack.where)
+        if result.verdict is Verdict.CERTIFIED:
+            yield "missed", why(lack)
+        if shares is not None:
+            yield f"fills {lack.where}", filling(shares)
+        yield "help", remedy(lack, shares)
+
+
+def _origin(certificate: Certificate) -> Facts:
+    tables, evaluations = certificate.result.controller, certificate.notes.evaluations
+    rows = [("hash", certificate.hash)]
+    if tables is not None:
+        rows.append(
+            ("controller", f"{len(tables.F.value)} states, the best of {evaluations} that were tried")
+        )
+    rows += [(name, str(told)) for name, told in certificate.run.items() if not isinstance(told, dict)]
+    return _facts(rows)
