@@ -45,6 +45,8 @@ def tags_in(text):
         found |= {
             f"theory {name}" for name in re.findall(r"(?<![\w.])\d[a-z]?\b", re.sub(r"\([^)]*\)", "", part))
         }
+    for first, last in re.findall(r"theory of the sampled loop, sections? (\d)(?: (?:to|and) (\d))?", text):
+        found |= {f"sampled loop {i}" for i in range(int(first), int(last or first) + 1)}
     return found | {name for name in ("F(x)",) if name in text}
 
 

@@ -1,7 +1,8 @@
 """Certificate D: a sampled, delayed, noisy loop about its plan, proven by one theorem.
 
 In: a specification with `hardware`, and the tables of a linear controller. Out: a tube that the loop never leaves.
-No metric: the error of the loop is summed by convolution, sample by sample. Implements: docs/theory-sampled-loop.md.
+No metric: the error of the loop is summed by convolution, sample by sample. Implements: theory of the sampled loop,
+sections 1 to 5.
 Trusted: yes; "certified" is said in `theorem` alone.
 
 | module | holds |
