@@ -34,6 +34,7 @@ ELSEWHERE = {
     "docs/howto/plan.md": "test_howto.py",
     "docs/reference/codes.md": "tests/spec/test_schema.py, tests/cli/test_everyday.py: fragments of `explain`",
     "docs/theory.md": "formulas; test_docs.py numbers them, tests/conditions evaluates them",
+    "docs/theory-sampled-loop.md": "formulas; tests/machines attacks what they prove",
 }
 
 # commands that are read but not run, by how they begin: why
