@@ -17,9 +17,9 @@ __all__ = ["Plant"]
 class Plant:
     """e' = A e + B delta + H eta + E w + [I, B] rho, with y = e + n at every sample and delta held, `delay` late.
 
-    A (n, n), B (n, m), H (n, r), E (n, k); `sample_time` and `delay` in s. Bounds: |n_i| <= noise_i (n,), or their
-    length <= noise_0 if `noise_ball`; |eta_i| <= magnitude_i, |eta_i'| <= rate_i (r,); |w_i| <= wind_i (k,), or their
-    length <= wind_0 if `wind_ball`; |e_i(0)| <= start_i (n,). `room` (m,): how far delta may go, inf where nothing
+    A (n, n), B (n, m), H (n, r), E (n, k); `sample_time` and `delay` in s. Bounds: |n_i| <= noise_i (n,), or the
+    length of n_i / noise_i <= 1 if `noise_ball`; |eta_i| <= magnitude_i, |eta_i'| <= rate_i (r,); |w_i| <= wind_i (k,), or
+    the length of w_i / wind_i <= 1 if `wind_ball`; |e_i(0)| <= start_i (n,), |eta_i(0)| <= eta_start_i (r,). `room` (m,): how far delta may go, inf where nothing
     limits it; `wishes` (n,): half-widths asked for, inf where nothing is. `remainder`: W (n,), U (m,) -> the bound of
     |rho| (n + m,) while |e| < W, |delta| <= U; it grows with both.
     """
@@ -39,4 +39,5 @@ class Plant:
     room: Array
     wishes: Array
     start: Array
+    eta_start: Array
     remainder: Callable[[Array, Array], Array]

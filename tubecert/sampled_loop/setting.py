@@ -14,12 +14,14 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.enclosure.domain import Range
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
+from tubecert.enclosure.outward import number_above
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, constant, free_symbols
-from tubecert.model import TIME, ControlAffineModel, time_period
+from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.sampled_loop.midrad import Known
-from tubecert.sampled_loop.record import Afterwards, Hold, PlanKnots, Tables
+from tubecert.sampled_loop.record import Afterwards, HexMatrix, Hold, PlanKnots, Tables
 from tubecert.spec import Spec
 from tubecert.spec.types import Hardware, Vector
 from tubecert.trajectory.plan import Plan
@@ -215,6 +217,20 @@ class Loop:
         """A common period in t of h, an enclosure; None if there is none to be seen."""
         return time_period(self.model.h or ())
 
+    @cached_property
+    def times(self) -> Range | None:
+        """The times that matter for h and the plan; None where nothing depends on t.
+
+        Raises `ValueError` for an h that depends on t for ever without a period.
+        """
+        period = time_period(moving_parts(self.spec))
+        if self.horizon is not None:
+            return Fraction(0), self.horizon
+        if period is None:
+            raise ValueError("h depends on t without a horizon or a period")
+        end = max(0.0 if self.plan.horizon is None else float(self.plan.horizon), float(period.hi))
+        return (0.0, number_above(end)) if end else None
+
     def goes_on(self) -> bool:
         """Whether the plan is known for all times of the claim: `repeat` needs a plan that repeats.
 
@@ -259,6 +275,11 @@ class Controller:
         """The tables of a record."""
         return cls(tables.F.value, tables.G.value, tables.M.value, tables.N.value)
 
+    def record(self) -> Tables:
+        """The same as they are written."""
+        F, G, M, N = map(HexMatrix, (self.F, self.G, self.M, self.N))
+        return Tables(F=F, G=G, M=M, N=N)
+
     @property
     def size(self) -> int:
         """z, the entries of its state."""
@@ -273,8 +294,3 @@ class Controller:
                 own.shape == shape and bool((own.astype(np.float32).astype(float) == own).all())
                 for own, shape in shapes
             )
-
-
-def depends_on_time(expressions: tuple[Expression, ...]) -> bool:
-    """Whether t occurs."""
-    return TIME in free_symbols(expressions)

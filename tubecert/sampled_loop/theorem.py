@@ -18,9 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert import digits
+from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.enclosure.outward import number_above, number_below
 from tubecert.enclosure.processor import require_ieee
+from tubecert.findings import Severity
+from tubecert.model import domain_findings
 from tubecert.sampled_loop.cells import MOST
 from tubecert.sampled_loop.midrad import SUMMED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
@@ -33,6 +36,7 @@ from tubecert.verdict import Verdict
 
 MOST_LAGS: Final = 50_000
 MOST_PARTS: Final = 64
+_CAREFUL: Final = Effort(budget=200_000)
 _FLUSHED: Final = (
     1e-35  # what a computer may lose that has no subnormal numbers, z + n <= 400 products and sums
 )
@@ -189,6 +193,42 @@ class Inequalities:
         spread = np.array([self._between(phase, off) for phase in phases])[index]
         return b * SUMMED, direct, spread
 
+    def causes(self, boxes: Boxes, stage: int) -> Array:
+        """What fills every e_i, delta_j, zeta at the worst sample of a stage, (n + m + z, 6): near, for explanations.
+
+        In turn: noise, holding, h and parameters, wind, start, and all else.
+        """
+        own, loop = self.responses, self.loop
+        n, sizes = loop.states, self.phases(boxes)[1]
+        b, direct, spread = self._all(boxes)
+        ends = [*self.starts[1:], self.last + 1]
+        k = np.arange(self.starts[stage], ends[stage])
+        lag = np.minimum(k, own.lags)
+        rows = np.arange(own.count)
+        last = len(own.nodes) - 1
+        held = np.concatenate([np.zeros(n), self.remainders.held])
+        parts = np.stack(
+            [
+                (weighed(own.noise_now, loop.noise) + own.noise[lag]),
+                total(own.rho, held)[lag],
+                self._slow(sizes, lag, k),
+                own.wind[lag],
+                self._first(np.arange(self.last + 1))[k],
+            ],
+            axis=-1,
+        )
+        within = own.direct[last]
+        node = slice(n * last, n * (last + 1))
+        parts[:, node, 1] += total(within.rho, held)
+        parts[:, node, 2] += total(within.rate, sizes.rate)
+        parts[:, node, 3] += within.wind
+        whole = b[k].copy()
+        whole[:, node] += direct[k, last] + np.max(spread[k], axis=1)
+        chosen = np.r_[node, n * (last + 1) : own.count]
+        worst = np.argmax(whole[:, chosen], axis=0)
+        found, top = parts[worst, rows[chosen]], whole[worst, rows[chosen]]
+        return np.hstack([found, np.maximum(top - found.sum(axis=1), 0.0)[:, None]])
+
     @property
     def _begins(self) -> Array:
         """The box of xi(0) without eta: zeta and what has been sent are 0 at boot."""
@@ -293,7 +333,8 @@ def check(
     below = Boxes.of(stages, names, above=False)
     with np.errstate(all="ignore"):  # what is not finite bounds nothing
         found = inequalities.of(above)
-    lacks = [*_short(loop, found, below), *_domain(loop, inequalities, above), *_wishes(loop, stages)]
+    lacks = [*_short(loop, found, below), *undefined(loop), *_domain(loop, inequalities, above)]
+    lacks += _wishes(loop, stages)
     if loop.slow and loop.unknown and not inequalities.remainders.smooth:
         lacks.append(Lack(kind="not_proven"))
     inputs, over = _inputs(loop, inequalities.remainders, above)
@@ -341,6 +382,15 @@ def _short(loop: Loop, found: Boxes, claimed: Boxes) -> list[Lack]:
     short = np.max(np.where(found.W < claimed.W, 0.0, 1.0), axis=0)
     where = loop.model.states[int(np.argmax(short))] if short.any() else ""
     return [Lack(kind="no_fixed_point", where=where)]
+
+
+def undefined(loop: Loop) -> list[Lack]:
+    """What is not proven to be defined on the safe set, or at a time that matters."""
+    try:
+        found = domain_findings(loop.spec, loop.times, _CAREFUL)
+    except ValueError:
+        return [Lack(kind="undefined")]
+    return [Lack(kind="undefined", where=item.message) for item in found if item.severity is Severity.ERROR]
 
 
 def _domain(loop: Loop, inequalities: Inequalities, boxes: Boxes) -> list[Lack]:
