@@ -1,10 +1,12 @@
 """What users write by mistake: a good specification, an edit of it, and what must be said of that.
 
+The edit is one of `GOOD` if that has the text, else of `ON_A_MACHINE`; lines have the same numbers in both.
+
 The table was read by somebody who did not know the messages: each is located, says what is wrong, and says what to
 write instead, or cannot be mistaken. A new mistake is a line here.
 """
 
-GOOD = """\
+_WHOLE = """\
 tubecert: 1
 name: cart
 system:
@@ -34,9 +36,13 @@ hardware: {rate: 500, delay: 0.001, noise: 0.0001}
 disturbance: {E: [[0], [1]], bound: 0.01}
 simulation: {duration: 5, runs: 20}
 """
+_HARDWARE = "hardware: {rate: 500, delay: 0.001, noise: 0.0001}"
+_CONTINUOUS = _WHOLE[_WHOLE.index("tube:") : _WHOLE.index("limits:")]
+GOOD = _WHOLE.replace(_HARDWARE, "# no machine")
+ON_A_MACHINE = _WHOLE.replace(_CONTINUOUS, "# no metric\n" * _CONTINUOUS.count("\n"))
 PLAN = GOOD[GOOD.index("trajectory:") : GOOD.index("initial_state:")]
 METRIC = GOOD[GOOD.index("metric:") : GOOD.index("limits:")]
-OBSTACLE = GOOD[GOOD.index("  - {states:") : GOOD.index("\nhardware:")]
+OBSTACLE = GOOD[GOOD.index("  - {states:") : GOOD.index("\n# no machine")]
 F = GOOD[GOOD.index("  f: [v") : GOOD.index("\n  B:")]
 
 # the text, what is written in its place, the code, line and column of the finding, and some of its words
@@ -347,8 +353,22 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("rate: 500", "rate: -500", "TC112", 26, 18, "hardware.rate is -500"),
     ("rate: 500", "rate: 0", "TC112", 26, 18, "hardware.rate is 0"),
     ("delay: 0.001", "delay: -0.001", "TC112", 26, 30, "hardware.delay is -0.001"),
-    ("delay: 0.001", "delay: 0.01", "TC112", 26, 30, "write a time in seconds, or `delay: one sample`"),
-    ("delay: 0.001", "delay: 1", "TC112", 26, 30, "1 s, longer than the sample time of 0.002 s"),
+    ("delay: 0.001", "delay: 1", "TC102", 26, 30, "is 500 samples; at most 64 are read"),
+    ("delay: 0.001", "delay: 20", "TC102", 26, 30, "write a time in seconds, or `delay: one sample`"),
+    ("noise: 0.0001}", "noise: 0.0001, noise_rate: 1}", "TC103", 26, 52, "arbitrary from sample to sample"),
+    ("noise: 0.0001}", "noise: 0.0001, precision: single}", "TC103", 26, 52, "it is called arithmetic"),
+    ("noise: 0.0001}", "noise: 0.0001, arithmetic: float32}", "TC112", 26, 64, "here it is single"),
+    ("noise: 0.0001}", "noise: 0.0001, arithmetic: exact}", "TC112", 26, 64, "what a computer rounds is part of"),
+    ("noise: 0.0001}", "noise: 0.0001, hold: zoh}", "TC112", 26, 58, "here it is left"),
+    ("noise: 0.0001}", "noise: 0.0001, hold: midle}", "TC112", 26, 58, "did you mean middle?"),
+    ("noise: 0.0001}", "noise: 0.0001}\ncontroller: lqr", "TC112", 27, 13, "choices: auto, none"),
+    ("noise: 0.0001}", "noise: 0.0001}\ncontroler: auto", "TC103", 27, 1, "did you mean controller?"),
+    ("noise: 0.0001}", "noise: 0.0001}\nmetric: {rate: 1, dual_metric: [[1, 0], [0, 1]]}", "TC112", 27, 9, "proven without a metric"),
+    ("noise: 0.0001}", "noise: 0.0001}\ntube: {epsilon: 1}", "TC112", 27, 17, "half_widths are wishes"),
+    ("noise: 0.0001}", "noise: 0.0001}\nconditions: {decides: B}", "TC112", 27, 13, "leave it out, or leave out hardware"),
+    ("# no metric", "trajectory.afterwards: rest", "TC103", 19, 1, "unknown key trajectory.afterwards"),
+    ("# no machine", "controller: auto", "TC112", 26, 13, "hardware: {rate: 500}, or leave it out"),
+    ("  horizon: 10", "  horizon: 10\n  afterwards: rest", "TC112", 18, 15, "hardware: {rate: 500}, or leave it out"),
     ("noise: 0.0001", "noise: -1", "TC112", 26, 44, "hardware.noise is -1"),
     ("noise: 0.0001", "noise: [0.1, 0.1]", "TC106", 26, 44, "hardware.noise must be a number, not a list"),
     ("noise: 0.0001", "noise: {x: 0.1}", "TC103", 26, 45, "known keys: v, z"),
@@ -363,7 +383,7 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("{E: [[0], [1]], bound: 0.01}", "{E: [[0], [1]]}", "TC105", 27, 1, "add bound: ..."),
     ("E: [[0], [1]]", "E: [0, 1]", "TC106", 27, 19, "write [0]"),
     ("disturbance: {E: [[0], [1]], bound: 0.01}", "disturbance: 0.01", "TC106", 27, 14, "write {bound: ...}"),
-    ("bound: 0.01", "bound: [0.01]", "TC106", 27, 37, "disturbance.bound must be a number, not a list"),
+    ("bound: 0.01", "bound: [0.01]", "TC112", 27, 37, "a list of them goes with hardware"),
     ("runs: 20", "runs: -3", "TC112", 28, 33, "is -3; it must be >= 1 and <= 1000000"),
     ("runs: 20", "runs: 2.5", "TC112", 28, 33, "simulation.runs must be a whole number"),
     ("duration: 5", "duration: 0", "TC112", 28, 24, "simulation.duration is 0"),
@@ -371,7 +391,8 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("runs: 20", "controllers: [pid]", "TC112", 28, 41, "choices: ccm, l1, nominal, reference"),
     ("simulation:", "expect: {verdict: ok}\nsimulation:", "TC112", 28, 19, "here it is certified"),
     ("simulation:", "expect: {verdict: certified, omega: 3}\nsimulation:", "TC103", 28, 30, "it is called bandwidth"),
-    ("simulation:", "conditions: {decides: D}\nsimulation:", "TC112", 28, 23, "choices: 0, 26, A, B, all, distance,"),
+    ("simulation:", "conditions: {decides: E}\nsimulation:", "TC112", 28, 23, "choices: 0, 26, A, B, all, distance,"),
+    ("simulation:", "conditions: {decides: D}\nsimulation:", "TC112", 28, 23, "name the computer, hardware: {rate: 500}"),
     ("simulation:", "conditions: {decides: [A, B]}\nsimulation:", "TC106", 28, 23, "26, distance, 0, A, B, all, not a list"),
     ("simulation:", "conditions: B\nsimulation:", "TC106", 28, 13, "write {decides: B}"),
     ("simulation:", "adaptation: {A_m: 5}\nsimulation:", "TC117", 28, 19, "write auto, or -10, which stands for -10 I"),

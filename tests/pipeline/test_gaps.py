@@ -71,9 +71,7 @@ def test_a_given_gap_wins_over_the_key_and_nothing_else_changes():
         ("tubecert/templates/car.yaml", False, {}),
         ("tubecert/templates/crane.yaml", True, {}),
         ("configs/quadrotor3d.yaml", False, {}),
-        ("configs/hardware_pvtol.yaml", True, {}),
         ("configs/two_state_orbit.yaml", False, {}),
-        ("configs/hardware_pvtol_moving.yaml", True, {}),
     ],
 )
 def test_half_widths_along_a_plan_that_moves_or_of_many_states_ask_for_it_by_themselves(

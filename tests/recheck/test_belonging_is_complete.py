@@ -62,7 +62,6 @@ def test_every_section_of_the_specification_is_compared(tmp_path):
         "limits": {"u": ["-1", "1"]},
         "simulation": {"runs": "3"},
         "expect": {"verdict": "certified"},
-        "hardware": {"sample_time": "0.01", "delay": "0", "noise": "0"},
         "metric": {"rate": "0.8", "dual_metric": [["1", "0"], ["0", "1"]]},
         "trajectory": {"kind": "equilibrium", "at": ["0.1", "0"], "input": ["0"]},
         "system": document["result"]["spec"]["effective"]["system"] | {"f": ["x", "y"]},

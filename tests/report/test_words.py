@@ -24,7 +24,6 @@ disturbance: {E: [[0], [1]], bound: 0.001}
 trajectory: {kind: equilibrium, at: [0, 0], input: [0], horizon: 3}
 tube: {half_widths: {z: 0.5}}
 metric: {dual_metric: [[1, -1], [-1, 2]], rate: 0.4}
-hardware: {rate: 500, delay: 0.001, noise: {z: 0.0001, v: 0.0001}}
 limits: {F: [-5, 5]}
 obstacles: [{states: [z, v], disc: {center: [0.9, 1.8], radius: 0.1}}]
 conditions: {decides: B}

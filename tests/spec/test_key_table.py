@@ -94,6 +94,13 @@ def read(text: str, path: str) -> Any:
         return None
 
 
+def _goes_without(key: str, data: Any, own: Any) -> bool:
+    """Whether a file is refused for a key that goes with hardware, and with a horizon."""
+    return (key == "controller" and "hardware" not in data) or (
+        key == "afterwards" and ("hardware" not in data or "horizon" not in own)
+    )
+
+
 def same_as_left_out(place: tuple[str, ...], values: list[Any]) -> set[str] | None:
     """Which values of a key mean what its absence means, in every file; None if there is no file without it."""
     path, (key, _, kind) = place[:-1], place[-1].partition("|")
@@ -102,6 +109,8 @@ def same_as_left_out(place: tuple[str, ...], values: list[Any]) -> set[str] | No
         data = copy.deepcopy(whole)
         own = next((each for each in sections(data, path) if not kind or each.get("kind") == kind), None)
         if own is None:
+            continue
+        if _goes_without(key, data, own):
             continue
         own.pop(key, None)
         without = effective(data, name)

@@ -76,12 +76,9 @@ def test_anywhere_else_it_is_refused(old, new):
         load_text(with_mass(only=(old, new)), "s.yaml")
 
 
-MACHINE = "hardware: {rate: 500}\n"
-
-
 def with_gain(**changes):
-    """The same with the parameter in B, too, and a machine."""
-    return with_mass(gain=("B: [[0], [1]]", "B: [[0], [0.3/m]]"), **changes) + MACHINE
+    """The same with the parameter in B, too."""
+    return with_mass(gain=("B: [[0], [1]]", "B: [[0], [0.3/m]]"), **changes)
 
 
 def test_a_gain_is_known_at_the_middle():
@@ -99,4 +96,4 @@ def test_a_gain_is_known_at_the_middle():
 
 
 def test_a_range_that_is_in_f_alone_leaves_B():
-    assert load_text(with_mass() + MACHINE, "s.yaml").gained == ()
+    assert load_text(with_mass(), "s.yaml").gained == ()

@@ -14,7 +14,7 @@ import jsonschema
 import proven
 import pytest
 import yaml
-from systems import SCALAR, SMALL
+from systems import SMALL
 
 import tubecert
 from tubecert import certificate, spec
@@ -97,7 +97,8 @@ def test_what_the_reader_says_of_keys_and_kinds_the_schema_says_too(path):
     # keys that are names; YAML that a schema never sees
     by_name = {"units_unknown", "tube_state", "start_box_unknown", "bounds_of_one_input", "bounds_mixed"}
     by_name |= {"mistake_unit_of_another_case", "hardware_noise_of_nothing"}
-    by_name |= {"disturbance_ragged", "disturbance_rows"}
+    by_name |= {"disturbance_ragged", "disturbance_rows", "disturbance_list_of_another_size"}
+    by_name |= {"input_rate_of_nothing"}
     exempt = {*by_name, "yaml_complex_key"}
     if codes and codes <= STRUCTURAL | {"TC113"} and path.stem not in exempt:
         assert errors("spec", as_text(path))
@@ -198,6 +199,7 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
     assert all(met), "a section that no example file of tests/specs/ok has"
     # their keys are states or inputs
     box = {"tube.half_widths", "trajectory.x", "trajectory.u", "limits", "hardware.noise", "hardware.limits"}
+    box |= {"trajectory.input_rate"}
     for (path, kind), known in asked.known.items():
         if path in box or path.startswith("uncertainty.bounds."):  # bounds of an input
             continue
@@ -271,7 +273,6 @@ VARIANTS = {
     "metric refuted": (SMALL, "rate: 0.8", "rate: 3", {}),
     "leaves": (SMALL, "epsilon: 0.2", "epsilon: 2", {}),
     "too much": (SMALL, "0.1*sin(t)", "10*sin(t)", {}),
-    "a machine": (SCALAR + "hardware: {rate: 200}\n", "", "", {}),
     "state-dependent": (ROOT / "configs/state_dependent_input.yaml", "", "", {}),
 }
 

@@ -27,7 +27,6 @@ from tubecert.claims.assumptions import (
     FirstOrderFilter,
     ForAllTime,
     HardProjection,
-    HardwareLeftOut,
     LeastFeedback,
     ParametersWithin,
     PerfectState,
@@ -238,7 +237,6 @@ def assumptions(
         else UncertaintyAsGiven(any_within_bounds=_any_start(spec)),
         *(() if wind is None else (WindWithin(bound=wind.length, rate=wind.rate),)),
         *(() if not spec.ranges else (ParametersWithin(),)),
-        *(() if spec.hardware is None else (HardwareLeftOut(),)),
     )
 
 

@@ -103,13 +103,6 @@ class UncertaintyAsGiven(Assumption):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HardwareLeftOut(Assumption):
-    """Sampling, delay and noise of the section `hardware` are no part of what is proven."""
-
-    tag: ClassVar[str] = "hardware_left_out"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class WindWithin(Assumption):
     """Beside the inputs acts E(x) w with |w| <= `bound`, else arbitrary.
 

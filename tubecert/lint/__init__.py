@@ -45,14 +45,26 @@ def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
 
 
 def _left_out(spec: Spec) -> list[Finding]:
-    """What a specification says of its machine that no certificate is about yet."""
-    told = {"hardware": spec.hardware is not None, "system.parameters": bool(spec.gained)}
-    message = {
-        "hardware": "sampling, delay and noise are read, and no part of what is proven",
-        "system.parameters": "parameters known by ranges stand in B, of which nothing is proven",
-    }
+    """What a specification says that no certificate of its kind is about."""
+    if spec.hardware is None:
+        message = "parameters known by ranges stand in B, of which nothing is proven in continuous time"
+        help = (
+            "name the computer, hardware: {rate: 500}, in place of the metric: its loop is proven with them"
+        )
+        told = {"system.parameters": (message, help)} if spec.gained else {}
+    else:
+        named = {output.name for output in spec.outputs}
+        told = {
+            f"tube.half_widths.{name}": (
+                f"a half-width of the output {name} beside hardware is no wish that is followed",
+                "wish for half-widths of states",
+            )
+            for name, _ in spec.tube.half_widths
+            if name in named
+        }
     return [
-        Finding(code=LEFT_OUT, message=message[key], severity=Severity.NOTE, location=spec.location(key))
-        for key, is_told in told.items()
-        if is_told
+        Finding(
+            code=LEFT_OUT, message=message, severity=Severity.NOTE, location=spec.location(key), help=help
+        )
+        for key, (message, help) in told.items()
     ]

@@ -124,7 +124,7 @@ def _idle(spec: Spec) -> Iterator[Finding]:
             yield Finding(
                 code=codes.IDLE_STATE,
                 severity=Severity.WARNING,
-                message=f"{name} cannot change: its rows in f and B are zero, so no metric contracts it",
+                message=f"{name} cannot change: its rows in f and B are zero, so nothing brings it back",
                 location=spec.location(f"system.f[{i}]"),
                 help=f"make {name} a parameter",
             )

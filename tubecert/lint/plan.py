@@ -19,7 +19,7 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.floats import floats, nearest
-from tubecert.lint.table import table_findings
+from tubecert.lint.table import paid, table_findings
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.spec import Obstacle, Spec, Vector
 
@@ -161,7 +161,7 @@ def _least_radius(spec: Spec) -> float:
 
 
 def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
-    if spec.tube.auto:  # how far it reaches in x is the metric's
+    if spec.tube.auto or spec.hardware is not None:  # how far it reaches in x is to be found
         return
     offset = 0.0
     if spec.within is None and spec.trajectory.task is None:
@@ -199,16 +199,14 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
     )
     if not worst > scale:
         return
-    bearable = nearest(model.rate) * _least_radius(spec)
+    bearable = nearest(model.rate) * _least_radius(spec) if spec.hardware is None else _bearable(spec)
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
         message = f"|f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)"
         if notable:
             message = f"the point is no equilibrium: {message}"
-            help = (
-                "choose at and input with f(at) + B(at) input = 0; what is missing is paid for in the gains"
-            )
+            help = f"choose at and input with f(at) + B(at) input = 0; {paid(spec)}"
         else:
             room = f"{up(100 * worst / bearable, 2)} % of what the tube has room for"
             message = f"the point is an equilibrium up to a rounding: {message}, {room}"
@@ -228,8 +226,13 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
             severity=Severity.WARNING,
             message=f"the plan misses x*' = f + B u* by {near(worst, 3)} at t = {near(curve.t[k], 4)} s",
             location=spec.location("trajectory.u"),
-            help="correct x or u there; what is missing is paid for in the gains",
+            help=f"correct x or u there; {paid(spec)}",
         )
+
+
+def _bearable(spec: Spec) -> float:
+    """A defect in units of the states per s that would cross the safe set in a second, where nothing else is known."""
+    return min(nearest(high - low) for low, high in spec.safe_set)
 
 
 def _obstacles(spec: Spec, curve: _Curve) -> Iterator[Finding]:

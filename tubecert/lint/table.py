@@ -63,6 +63,11 @@ class _Dynamics:
         return found
 
 
+def paid(spec: Spec) -> str:
+    """What a defect of the plan costs."""
+    return f"what is missing is paid for in the {'gains' if spec.hardware is None else 'width of the tube'}"
+
+
 def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: float) -> Iterator[Finding]:
     """What is amiss with a plan file that can be read; `radius` is that of the least tube."""
     knots = table.knots
@@ -104,8 +109,7 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
             f"the plan misses x*' = f + B u* by {near(worst, 3)} between t = {near(points.t[k], 4)} s and "
             f"t = {near(points.t[k + 1], 4)} s",
             places[k],
-            "see whether it is a plan of this system, in its units, and give more knots there; what is missing is "
-            "paid for in the gains",
+            f"see whether it is a plan of this system, in its units, and give more knots there; {paid(spec)}",
         )
 
 

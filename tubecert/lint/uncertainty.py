@@ -25,10 +25,15 @@ _BUDGET = 4_000
 
 def uncertainty_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
     """Findings about h and its declared bounds."""
+    is_met = spec.hardware is None  # by adaptation; a machine may have nothing to compensate
     if spec.uncertainty.h is None:
-        return list(_declared_zero(spec))
+        return list(_declared_zero(spec)) if is_met else []
     if all(term.expression is ZERO for term in spec.uncertainty.h):
-        return [_nothing(spec, "uncertainty.h", "h is zero: there is no uncertainty to compensate")]
+        return (
+            []
+            if not is_met
+            else [_nothing(spec, "uncertainty.h", "h is zero: there is no uncertainty to compensate")]
+        )
     return list(_bounds(spec, time, replace(effort, gap=0.05, budget=min(effort.budget, _BUDGET))))
 
 

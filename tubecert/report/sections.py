@@ -13,7 +13,6 @@ from rich.text import Text
 
 from tubecert.bounds.meanings import meaning
 from tubecert.certificate.result import Bound, MetricData, Result, TubeData
-from tubecert.claims.assumptions import HardwareLeftOut
 from tubecert.claims.family import Reason
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
 from tubecert.kinds import ALONE, DISTANCE, RATES
@@ -258,5 +257,4 @@ def _assumptions(result: Result, verbose: bool) -> list[RenderableType]:
         f"exact continuous-time control, full state, no noise, delay or saturation; {geodesics}; filter "
         f"and predictor start at rest; the uncertainty is as specified ({len(stated)} in all, -v shows them)"
     )
-    left_out = [assumed(item) for item in stated if isinstance(item, HardwareLeftOut)]
-    return [Text(line) for line in [brief, *left_out, *(believed if declared else [])]]
+    return [Text(line) for line in [brief, *(believed if declared else [])]]

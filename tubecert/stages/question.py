@@ -32,7 +32,6 @@ _APART: Final = (
     "simulation",
     "conditions",
     "adaptation",
-    "hardware",
     "limits",
     "obstacles",
 )

@@ -7,7 +7,6 @@ from tubecert.claims.assumptions import (
     FirstOrderFilter,
     ForAllTime,
     HardProjection,
-    HardwareLeftOut,
     LeastFeedback,
     ParametersWithin,
     PerfectState,
@@ -32,7 +31,6 @@ _FIXED: dict[type[Assumption], str] = {
     "ball",
     HardProjection: "the projection is hard",
     PerfectState: "the full state is measured without noise or delay, and inputs do not saturate",
-    HardwareLeftOut: "sampling, delay and noise of the section hardware are no part of what is proven",
     FirstOrderFilter: "the filter is first order, C(s) = omega/(s + omega)",
     ForAllTime: "the claim is for all t >= 0",
     ParametersWithin: "the parameters that are known by ranges are constant and lie in them; predictor, feedback and "
