@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
-from itertools import product
+from itertools import pairwise, product
 from typing import Final
 
 import numpy as np
@@ -144,12 +143,17 @@ def largest_jump(loop: Loop) -> Array:
     """
     knots = loop.plan.knots
     assert knots is not None
-    inner = knots.t[1:-1] if loop.afterwards != "repeat" else knots.t[1:]
-    if loop.hold == "middle" and all(((t - loop.rest) / loop.sample_time).denominator == 1 for t in inner):
+    rows = knots.u[:-1]
+    pairs = list(zip(knots.t[1:-1], rows, rows[1:], strict=False))
+    if loop.afterwards == "repeat":
+        pairs.append((knots.t[-1], rows[-1], rows[0]))
+    jumps = [(t, [abs(b - a) for a, b in zip(before, after, strict=True)]) for t, before, after in pairs]
+    jumps = [(t, sizes) for t, sizes in jumps if any(sizes)]
+    aligned = all(((t - loop.rest) / loop.sample_time).denominator == 1 for t, _ in jumps)
+    if not jumps or (loop.hold == "middle" and aligned):
         return np.zeros(loop.inputs)
-    closest = min(b - a for a, b in zip(knots.t, knots.t[1:], strict=False))
+    closest = min((b - a for (a, _), (b, _) in pairwise(jumps)), default=loop.sample_time)
     met = int(loop.sample_time / closest) + 1
-    rows = knots.u[: len(knots.t) - 1]
-    follows = [*rows[1:], rows[0]]
-    sizes = [max(abs(b[j] - a[j]) for a, b in zip(rows, follows, strict=True)) for j in range(loop.inputs)]
-    return np.array([fraction_bounds(met * Fraction(size))[1] for size in sizes])
+    return np.array(
+        [fraction_bounds(met * max(sizes[j] for _, sizes in jumps))[1] for j in range(loop.inputs)]
+    )
