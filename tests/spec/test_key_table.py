@@ -21,6 +21,7 @@ FILES = [
     *sorted((PACKAGE.parent / "tests/specs/ok").glob("*.yaml")),
     *sorted((PACKAGE.parent / "configs").glob("*.yaml")),
     PACKAGE / "templates/csv.yaml",
+    PACKAGE.parent / "tests/specs/planned/hardware_table.yaml",
 ]
 ANY = "*"  # an entry of a list, or the value of a name
 
