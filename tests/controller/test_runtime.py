@@ -1,0 +1,276 @@
+"""The controller in C against exact arithmetic: its steps, the plan that it follows, samples that are bad."""
+
+import shutil
+import subprocess
+from fractions import Fraction
+from pathlib import Path
+
+import handmade
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tubecert.controller.compiled import BAD, CLIPPED, END, Controller, build
+from tubecert.controller.data import HOME, data_of, exact_step
+from tubecert.controller.folder import RUNTIME, files_of, marked, write
+from tubecert.errors import ExitCode, TubecertError
+from tubecert.sampled_loop.record import Lack, PlanKnots
+from tubecert.verdict import Verdict
+
+WAVE = handmade.WAVE % ""
+RESTING = handmade.WAVE % ", afterwards: rest"
+REPEATED = handmade.WAVE % ", afterwards: repeat"
+PLANS = [
+    (handmade.REST, "nothing"),
+    (WAVE, "nothing"),
+    (RESTING, "rest"),
+    (REPEATED, "repeat"),
+    (handmade.ANY, "nothing"),
+]
+
+
+def loop(trajectory=handmade.REST, lanes=1, **options):
+    return Controller(data_of(handmade.certificate(trajectory, **options)), lanes)
+
+
+def feedforward(trajectory=handmade.REST, **options):
+    """A controller that hands out the plan's input."""
+    tables = handmade.tables(1)
+    tables.M.value[:] = 0
+    tables.N.value[:] = [[1e-30, 0]]  # some controller
+    return loop(trajectory, z=1, controller=tables, **options)
+
+
+def held_knots():
+    """u* jumps at t = .1 and .2; x* is at rest at the knots."""
+    t = (Fraction(0), Fraction("0.1"), Fraction("0.2"))
+    rest = (Fraction(0), Fraction(0))
+    return PlanKnots(t=t, x=(rest,) * 3, u=tuple((Fraction(u),) for u in (1, 2, 3)), interpolation="hold")
+
+
+def shipped(folder, **options):
+    """The files of a certificate in a folder of their own."""
+    write(str(folder), files_of(data_of(handmade.certificate(**options))))
+    return Path(folder)
+
+
+@pytest.mark.slow
+@given(
+    z=st.integers(0, 4),
+    seed=st.integers(0, 99),
+    single=st.booleans(),
+    parts=st.lists(st.lists(st.floats(-1, 1), min_size=2, max_size=2), min_size=1, max_size=6),
+)
+@settings(max_examples=15, deadline=None)
+def test_steps_are_exact_but_for_rounding(z, seed, single, parts):
+    """Every sum is within gamma(z + n + 3) of the sizes of its terms: r_u and r_z of the proof."""
+    tables, arithmetic = handmade.tables(z, seed), "single" if single else "double"
+    own = loop(z=z, arithmetic=arithmetic, controller=tables)
+    data, state = own.data, own.state[0]
+    xs, us = (each[0] for each in data.plan.at([0]))
+    unit = (z + 5) * (2.0**-24 if single else 2.0**-53) * 1.001
+    for part in parts:
+        y = (xs + np.array(part) * data.reach * 0.999).astype(data.real).astype(float)
+        before = state["zeta"][:z].astype(float)
+        u, later = exact_step(data, before, y, xs, us)
+        [found] = own.step(y)
+        size = {
+            row: abs(data.tables[a]) @ abs(before) + abs(data.tables[b]) @ abs(y - xs)
+            for row, a, b in ("uMN", "zFG")
+        }
+        assert abs(float(Fraction(found[0]) - u[0])) <= unit * (size["u"][0] + abs(us[0])) + 1e-37
+        for i in range(z):
+            assert abs(float(Fraction(float(state["zeta"][i])) - later[i])) <= unit * size["z"][i] + 1e-37
+    assert state["bad"] == 0
+
+
+def u_star(t):
+    return np.cos(t) / 3 + 0.1 * np.sin(2 * t) ** 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hold", ["middle", "left", "continuous"])
+@pytest.mark.parametrize(("trajectory", "afterwards"), PLANS[1:4])
+def test_the_plan_is_taken_when_its_command_acts(trajectory, afterwards, hold):
+    """x* at t_k; u* at the middle or the beginning of [t_k + delay, t_k + delay + Ts): not at t_k."""
+    own = feedforward(trajectory, afterwards=afterwards, hold=hold)
+    later = 0.005 + (0.01 if hold == "middle" else 0)
+
+    def during(t):
+        return t if afterwards == "repeat" else min(t, 1.01)
+
+    for k in range(60):
+        t = during(k * 0.02)
+        [[u]] = own.step(np.array([np.sin(t), np.cos(t)]))
+        row = min(k, 50) if afterwards == "nothing" else k
+        assert u == pytest.approx(u_star(during(row * 0.02 + later)), rel=1e-7, abs=1e-7)
+        assert own.status[0] == (END if afterwards == "nothing" and k > 50 else 0)
+    assert u_star(1) != pytest.approx(u_star(1 + later), abs=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("afterwards", "steps", "then"), [("repeat", 10, 1.0), ("rest", 11, 2.0), ("nothing", 10, 2.0)]
+)
+def test_where_the_input_jumps_it_is_taken_from_its_interval(afterwards, steps, then):
+    """Command 4 acts over [.085, .105), whose middle is before the jump; command 5 over [.105, .125).
+
+    The command of the last row acts beyond the end, over [.185, .205): there the plan is what comes afterwards.
+    """
+    own = feedforward(planned=held_knots(), afterwards=afterwards)
+    assert own.data.plan.steps == steps
+    rows = own.data.plan.at(range(steps))[0]
+    order = [*range(10), *(range(5) if afterwards == "repeat" else [steps - 1] * 5)]
+    assert [own.step(rows[row])[0, 0] for row in order] == [1.0] * 5 + [2.0] * 5 + [then] * 5
+    assert own.state["bad"][0] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arithmetic", ["double", "single"])
+def test_a_bad_sample_holds_and_is_told_while_it_lasts(arithmetic):
+    own = loop(lanes=3, arithmetic=arithmetic)
+    [x], _ = own.data.plan.at([0])
+    good = own.step(x + 0.1)
+    kept = own.state["zeta"].copy()
+    for bad in (np.nan, np.inf, -np.inf, 1e300, x[0] + own.data.reach[0] * 1.001):
+        with np.errstate(over="ignore"):
+            found = own.step(np.where([[False, False], [True, False], [False, False]], bad, x))
+        assert own.status.tolist() == [0, BAD, 0]
+        assert found[1] == good[1], "the last correction about the plan's input"
+        assert (own.state["zeta"][1] == kept[1]).all()
+    assert own.state["bad"].tolist() == [0, 5, 0]
+    own.step(x + 0.1)
+    assert own.status.tolist() == [0, 0, 0], "afterwards it goes on"
+    assert not (own.state["zeta"][1] == kept[1]).all()
+
+
+@pytest.mark.slow
+def test_time_goes_on_while_samples_are_bad():
+    own = loop(WAVE)
+    found = [own.step(np.array([np.nan, 0.0]))[0, 0] for _ in range(55)]
+    wanted = own.data.plan.at(range(51))[1][:, 0].tolist()
+    assert found == wanted + wanted[-1:] * 4, "the correction is 0: the plan's input, and its last"
+    assert (own.state["bad"][0], own.status[0]) == (51, END)
+
+
+@pytest.mark.slow
+def test_a_family_is_handed_its_plan():
+    own = loop(handmade.ANY, lanes=2)
+    xs, us = np.array([[0.5, 0.1], [-0.3, 0.0]]), np.array([[0.25], [-0.5]])
+    assert own.step(xs, xs, us).tolist() == us.tolist()
+    assert own.step(np.zeros(2), xs, us).shape == (2, 1)
+    assert own.status.tolist() == [BAD, 0], "compared with the plan that is handed in"
+    with pytest.raises(AssertionError, match="handed in"):
+        own.step(xs)
+
+
+@pytest.mark.slow
+def test_inputs_stay_in_the_range_and_a_limit_that_acts_is_told():
+    big = handmade.tables(1)
+    big.N.value[:] = [[100.0, 0.0]]
+    own = loop(controller=big, z=1)
+    [x], _ = own.data.plan.at([0])
+    for side, limit in ((1, Fraction("3.3")), (-1, Fraction("-3.1"))):
+        [[u]] = own.step(x + np.array([0.2 * side, 0.0]))
+        assert own.status[0] == CLIPPED
+        beyond = np.nextafter(u, np.inf * side)
+        assert Fraction(u) * side <= limit * side < Fraction(float(beyond)) * side
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arithmetic", ["double", "single"])
+@pytest.mark.parametrize(("trajectory", "afterwards"), PLANS)
+def test_the_self_test_passes_and_notices_a_digit(tmp_path, trajectory, afterwards, arithmetic):
+    folder = shipped(tmp_path / "a b", trajectory=trajectory, afterwards=afterwards, arithmetic=arithmetic)
+    command = ["controller.c", "selftest.c", "-o", "selftest"]
+    build(folder, command)
+    done = subprocess.run([folder / "selftest"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    data = (folder / "controller_data.h").read_text()
+    at = data.index("0x1.", data.index("float G[")) + 4
+    (folder / "controller_data.h").write_text(data[:at] + ("1" if data[at] != "1" else "2") + data[at + 1 :])
+    build(folder, command)
+    assert subprocess.run([folder / "selftest"], capture_output=True, check=False).returncode == 1
+
+
+@pytest.mark.slow
+def test_fast_math_is_refused(tmp_path):
+    folder = shipped(tmp_path / "c")
+    for flag in ("-ffast-math", "-ffinite-math-only"):
+        with pytest.raises(TubecertError, match="removes the test"):
+            build(folder, [flag, "-c", "controller.c"])
+
+
+ATTACK = """
+#include "controller.h"
+#include <math.h>
+int main(void) {
+  static State s; uint64_t seed = 7; uint32_t bad = 0; real y[NX], u[NU];
+  const real odd[] = {(real)NAN, (real)INFINITY, -(real)INFINITY, (real)1e30, (real)-1e30};
+  for (long t = 0; t < 1000000; t++) {
+    for (int i = 0; i < NX; i++) {
+      seed = seed * 6364136223846793005u + 1442695040888963407u;
+      y[i] = (real)((double)(seed >> 11) / 9007199254740992.0 - 0.5) * (real)0.5 + (i == 0 ? (real)0.5 : 0);
+    }
+    if (t % 100 == 0) { y[t / 100 % NX] = odd[t / 100 % 5]; bad++; }
+    const uint32_t status = controller_step(&s, y, u);
+    if (!(u[0] >= -3.1001 && u[0] <= 3.3001) || (status & STATUS_BAD) != (t % 100 == 0) || s.bad != bad) return 1;
+    for (int i = 0; i < NZ; i++) if (!(fabs(s.zeta[i]) <= 0.3001)) return 2;
+  }
+  return 0;
+}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arithmetic", ["double", "single"])
+def test_a_million_samples_of_which_some_are_bad(tmp_path, arithmetic):
+    """Under sanitizers: every input finite and in the proven range, every bad sample told."""
+    folder = shipped(tmp_path / "c", arithmetic=arithmetic, z=3)
+    (folder / "attack.c").write_text(ATTACK)
+    flags = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    try:
+        build(folder, [*flags, "controller.c", "attack.c", "-o", "attack"])
+    except TubecertError:
+        pytest.skip("no sanitizers here")
+    done = subprocess.run([folder / "attack"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_runtime_tells_its_own_hash_and_is_short():
+    for name in RUNTIME:
+        assert marked((HOME / name).read_bytes()), name
+        assert not marked((HOME / name).read_bytes() + b" ")
+    assert sum(len((HOME / name).read_text().splitlines()) for name in RUNTIME[:2]) <= 120
+
+
+@pytest.mark.slow
+def test_files_are_the_same_every_time():
+    one, other = (files_of(data_of(handmade.certificate(WAVE))) for _ in range(2))
+    assert one == other
+    assert all(marked(text.encode()) for text in one.values())
+
+
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        ({"verdict": Verdict.UNDECIDED, "lacks": (Lack(kind="no_design"),)}, ExitCode.UNDECIDED),
+        ({"verdict": Verdict.REFUTED}, ExitCode.NOT_CERTIFIED),
+        ({"z": 0}, ExitCode.INVALID),
+    ],
+)
+def test_what_is_not_certified_or_has_no_controller_is_refused(changes, code):
+    own = handmade.certificate(**changes)
+    own.result.controller.N.value[:] = 0
+    with pytest.raises(TubecertError) as caught:
+        data_of(own)
+    assert caught.value.exit_code is code
+    assert caught.value.findings[0].help
+
+
+def test_without_a_compiler_the_remedy_is_told(monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(TubecertError, match="no C compiler on PATH") as caught:
+        loop(controller=handmade.tables(2, 77))
+    assert "install" in caught.value.findings[0].help

@@ -1,0 +1,89 @@
+"""Certificates of small loops, made by hand: what is proven of them is not true, and code does not care."""
+
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.certificate.effective import Effective
+from tubecert.certificate.file import digest
+from tubecert.sampled_loop.file import seal
+from tubecert.sampled_loop.record import (
+    Certificate,
+    Claim,
+    HexMatrix,
+    InputUse,
+    Notes,
+    PlanKnots,
+    Result,
+    Source,
+    Stage,
+    Tables,
+)
+from tubecert.spec import canonical, load_text
+from tubecert.verdict import Verdict
+
+REST = "{kind: equilibrium, at: [0.5, 0], input: [0.5]}"
+WAVE = "{kind: expressions, x: [sin(t), cos(t)], u: [cos(t)/3 + 0.1*sin(2*t)**2], horizon: 1.01%s}"
+ANY = "{kind: any, x: {p: [-1, 1], v: [-1, 1]}, u: {F: [-1, 1]}, defect: 0, horizon: 1}"
+SPEC = """
+tubecert: 1
+name: cart
+system: {states: [p, v], inputs: [F], f: [v, "-v"], B: [[0], [1]]}
+safe_set: {p: [-2, 2], v: [-2, 2]}
+trajectory: TRAJECTORY
+hardware: {sample_time: 0.02, delay: 0.005, noise: {p: 0.001, v: 0.002}, arithmetic: ARITHMETIC, hold: HOLD}
+initial_state: START
+limits: {F: [-8, 8]}
+"""
+
+
+def tables(z: int, seed: int = 0) -> Tables:
+    """Tables of single precision of a controller with z states, two measured ones, one input."""
+    draw = np.random.default_rng(seed)
+    sizes = {"F": (z, z), "G": (z, 2), "M": (1, z), "N": (1, 2)}
+    drawn = {name: draw.uniform(-1, 1, size).astype(np.float32) for name, size in sizes.items()}
+    return Tables(**{name: HexMatrix(matrix.astype(float)) for name, matrix in drawn.items()})
+
+
+def certificate(
+    trajectory: str = REST,
+    *,
+    z: int = 2,
+    arithmetic: str = "double",
+    hold: str = "middle",
+    afterwards: str = "nothing",
+    planned: PlanKnots | None = None,
+    controller: Tables | None = None,
+    **changes: object,
+) -> Certificate:
+    """The certificate of a cart along a trajectory; `changes` are further fields of the result."""
+    start = "{within: 0.1}" if "any" in trajectory else "{at: [0, 1]}"
+    words = {"TRAJECTORY": trajectory, "ARITHMETIC": arithmetic, "HOLD": hold, "START": start}
+    text = SPEC
+    for word, value in words.items():
+        text = text.replace(word, value)
+    data = canonical(load_text(text))
+    if planned is not None:  # through knots, as from a planner
+        data["trajectory"] = {"kind": "csv", "file": "plan.csv", "interpolation": planned.interpolation}
+        data["trajectory"] |= {"horizon": str(planned.t[-1])} | (
+            {"afterwards": afterwards} if afterwards != "nothing" else {}
+        )
+    stages = [(0, "0.3", "0.5"), (40, "0.2", "0.6")]
+    fields = {
+        "verdict": Verdict.CERTIFIED,
+        "spec": Source(effective=Effective.of(data), effective_hash=digest(data), file_hash="sha256:0"),
+        "claim": Claim(horizon=None, afterwards=afterwards, hold=hold),
+        "planned": planned,
+        "controller": tables(z) if controller is None else controller,
+        "tube": tuple(
+            Stage(
+                start=start,
+                half_widths={"p": Fraction(p), "v": Fraction(v)},
+                deviations={"F": Fraction(4)},
+                memory=(Fraction("0.3"),) * z,
+            )
+            for start, p, v in stages
+        ),
+        "inputs": (InputUse(input="F", range=(Fraction("-3.1"), Fraction("3.3"))),),
+    }
+    return seal(Result(**(fields | changes)), Notes(), {})
