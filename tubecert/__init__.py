@@ -14,13 +14,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tubecert.errors import SpecError, TargetError, TubecertError
-    from tubecert.library.certification import Certification, Gains, read
+    from tubecert.library.certification import Certification, Gains
     from tubecert.library.certifying import certify
     from tubecert.library.checks import Checked, check
     from tubecert.library.comparing import Comparison, compare
     from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
     from tubecert.library.pages import Report, report
+    from tubecert.library.reading import read
     from tubecert.library.rechecking import Rechecked, recheck
+    from tubecert.library.sampled import SampledCertification
     from tubecert.library.simulating import simulate
     from tubecert.library.simulation import Simulation
     from tubecert.library.specification import Specification, load, specification
@@ -36,6 +38,7 @@ __all__ = [
     "Phase",
     "Rechecked",
     "Report",
+    "SampledCertification",
     "Simulation",
     "SpecError",
     "Specification",
@@ -65,7 +68,7 @@ __all__ = [
 _HOMES = {
     "Certification": "library.certification",
     "Gains": "library.certification",
-    "read": "library.certification",
+    "read": "library.reading",
     "certify": "library.certifying",
     "Checked": "library.checks",
     "check": "library.checks",
@@ -78,6 +81,7 @@ _HOMES = {
     "verify": "library.metrics",
     "Rechecked": "library.rechecking",
     "Report": "library.pages",
+    "SampledCertification": "library.sampled",
     "Simulation": "library.simulation",
     "Specification": "library.specification",
     "load": "library.specification",

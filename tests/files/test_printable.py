@@ -28,6 +28,7 @@ from tubecert.findings import Finding, Location, Severity
 from tubecert.printable import blanked, harmless, printable_json, visible
 from tubecert.report import html, markdown
 from tubecert.report.page import typeset
+from tubecert.report.page_sections import page_of
 from tubecert.report.terminal import Terminal
 
 ROOT = Path(__file__).parents[2]
@@ -179,10 +180,10 @@ def test_recheck_shows_unknown_members_and_the_hash_on_lines_of_their_own(member
     assert not any(line.startswith("confirmed") for line in output.splitlines())
 
 
-@pytest.mark.parametrize("render", [html.render, markdown.render])
+@pytest.mark.parametrize("render", [html.render_page, markdown.render_page])
 def test_the_line_to_copy_is_one_command_of_the_shell(render):
     name = "x'; touch hurt; echo $(id) `id` \"&"
-    page = render(Certificate.from_json(planted(name, "spec", "effective", "name")))
+    page = render(page_of(Certificate.from_json(planted(name, "spec", "effective", "name"))))
     import html as escapes
 
     lines = (re.sub(r"</?pre>", "", line).strip() for line in escapes.unescape(page).splitlines())
@@ -211,8 +212,8 @@ def test_markdown_shows_a_text_as_it_is(text):
 @settings(max_examples=50, deadline=None)
 @given(MARKUP)
 def test_nothing_in_a_certificate_is_markup_of_its_page(text):
-    plain = markdown.render(Certificate.from_json(planted("x", *PLACES[0])))
-    page = markdown.render(Certificate.from_json(planted(visible(text), *PLACES[0])))
+    plain = markdown.render_page(page_of(Certificate.from_json(planted("x", *PLACES[0]))))
+    page = markdown.render_page(page_of(Certificate.from_json(planted(visible(text), *PLACES[0]))))
     parser = MarkdownIt("commonmark")
     count = [sum(token.type == "heading_open" for token in parser.parse(each)) for each in (plain, page)]
     assert count[0] == count[1]

@@ -97,7 +97,7 @@ def told(sealed):
 
 
 def parsed(certificate):
-    return pages.Page(html.render(told(certificate)))
+    return pages.Page(html.render_page(page_of(told(certificate))))
 
 
 def section(certificate, key):
@@ -120,7 +120,7 @@ def test_well_formed_with_unique_anchors_that_resolve(any_certificate):
 
 @pytest.mark.slow
 def test_nothing_is_loaded_and_nothing_runs(any_certificate):
-    source = html.render(told(any_certificate))
+    source = html.render_page(page_of(told(any_certificate)))
     page = pages.Page(source)
     assert not {"script", "iframe", "object", "embed", "img", "form"} & set(page.tags)
     assert all(link.startswith(("#", "data:,")) for link in page.values("href") + page.values("src"))
@@ -135,8 +135,8 @@ def test_the_same_certificate_gives_the_same_page_before_and_after_it_is_written
     read_back = json.loads(certificate.dump(any_certificate))
     shuffled = {key: read_back[key] for key in reversed(read_back)}
     shuffled["result"] = {key: read_back["result"][key] for key in reversed(read_back["result"])}
-    for render in (html.render, markdown.render):
-        assert render(told(any_certificate)) == render(told(read_back)) == render(told(shuffled))
+    for render in (html.render_page, markdown.render_page):
+        assert len({render(page_of(told(each))) for each in (any_certificate, read_back, shuffled)}) == 1
 
 
 @pytest.mark.slow
@@ -144,9 +144,9 @@ def test_the_page_does_not_depend_on_the_process(tmp_path, orbit):
     file = tmp_path / "orbit.json"
     file.write_text(certificate.dump(orbit), encoding="utf-8")
     code = (
-        "import json, sys; from tubecert.report import html;"
+        "import json, sys; from tubecert.report import html; from tubecert.report.page_sections import page_of;"
         "from tubecert.certificate.result import Certificate;"
-        "sys.stdout.buffer.write(html.render(Certificate.from_json(json.load(open(sys.argv[1])))).encode())"
+        "sys.stdout.buffer.write(html.render_page(page_of(Certificate.from_json(json.load(open(sys.argv[1]))))).encode())"
     )
     outputs = set()
     for seed in ("0", "1234"):
@@ -154,7 +154,7 @@ def test_the_page_does_not_depend_on_the_process(tmp_path, orbit):
         command = [sys.executable, "-c", code, str(file)]
         done = subprocess.run(command, capture_output=True, check=True, env=environment, timeout=60)
         outputs.add(done.stdout)
-    assert outputs == {html.render(told(orbit)).encode()}
+    assert outputs == {html.render_page(page_of(told(orbit))).encode()}
 
 
 FORMULA = {"math", "mrow", "mi", "mn", "mo", "mtext", "msub", "msup", "mover", "mfrac", "msqrt"}
@@ -481,7 +481,7 @@ def test_a_margin_around_is_the_margin_of_those_gains(regulated):
 
 
 def test_markdown_says_the_same(any_certificate):
-    text = markdown.render(told(any_certificate))
+    text = markdown.render_page(page_of(told(any_certificate)))
     plain = text.replace("\\", "")
     result = any_certificate["result"]
     assert text.startswith(f"# {markdown.escape(result['spec']['effective']['name'])}: {result['verdict']}\n")
@@ -495,7 +495,7 @@ def test_markdown_says_the_same(any_certificate):
 @settings(deadline=None, max_examples=40)
 @given(HOSTILE)
 def test_markdown_tables_keep_their_columns(text):
-    lines = markdown.render(told(_planted(text))).splitlines()
+    lines = markdown.render_page(page_of(told(_planted(text)))).splitlines()
     width = None
     for line in lines:
         if line.startswith("| "):
@@ -539,8 +539,8 @@ def test_certify_writes_pages_beside_the_certificate(folder, proven):
     assert done.exit_code == 0, done.output
     assert "page a.html" in done.output
     written = json.loads(Path("plant.certificate.json").read_text(encoding="utf-8"))
-    assert Path("a.html").read_text(encoding="utf-8") == html.render(told(written))
-    assert Path("b.md").read_text(encoding="utf-8") == markdown.render(told(written))
+    assert Path("a.html").read_text(encoding="utf-8") == html.render_page(page_of(told(written)))
+    assert Path("b.md").read_text(encoding="utf-8") == markdown.render_page(page_of(told(written)))
     assert {p.name for p in folder.iterdir()} == {"a.html", "b.md", "plant.certificate.json", "plant.yaml"}
 
 
@@ -666,7 +666,7 @@ def shown(tmp_path, orbit, regulated, outside):
     written = {}
     for name, each in {"orbit": orbit, "regulated": regulated, "outside": outside}.items():
         written[name] = tmp_path / f"{name}.html"
-        written[name].write_text(html.render(told(each)), encoding="utf-8")
+        written[name].write_text(html.render_page(page_of(told(each))), encoding="utf-8")
     return written
 
 

@@ -21,7 +21,7 @@ from tubecert.cli.targets import plan_of, refused, spare
 from tubecert.digits import exact
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
-from tubecert.library.asked import certification_numbers, jobs_of
+from tubecert.library.asked import certification_numbers, jobs_of, require_nothing_of_a_metric
 from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
 
@@ -62,6 +62,9 @@ def run(given: Given, output: Output) -> ExitCode:
     from tubecert.spec.metric_file import with_metric
 
     system = spec.load(given.spec, settings)
+    if system.hardware is not None:
+        spare(target, {"plan": plan_of(given.spec, system)})
+        return _sampled(given, system, (target, pages), output)
     if given.metric is not None:
         system = with_metric(system, str(given.metric))
     kept = _kept_place(given, system, target)
@@ -72,7 +75,6 @@ def run(given: Given, output: Output) -> ExitCode:
 
     workers = workers_of(jobs, given.scheduler, "--scheduler")
     options = numbers.options(conditions=given.conditions, metric=given.metric)
-    command = visible(shlex.join(["tubecert", *sys.argv[1:]]))
     terminal = Terminal.stderr(color=output.color)
     if system.metric is None and system.synthesis is not None:
         telling.warn_of_size(system, terminal, output)
@@ -82,7 +84,7 @@ def run(given: Given, output: Output) -> ExitCode:
             options,
             report,
             seconds=None if seconds is None else Fraction(seconds) * _OF_SEARCH,
-            command=command,
+            command=_command(),
             workers=workers,
             kept=telling.kept(lambda so_far: _will(so_far, kept)),
         )
@@ -92,6 +94,42 @@ def run(given: Given, output: Output) -> ExitCode:
     write_pages(pages, found.certificate)
     _report(found, target, metric, pages, output)
     return found.verdict.exit_code
+
+
+def _sampled(given: Given, system: Spec, files: tuple[str, Sequence[str]], output: Output) -> ExitCode:
+    """The same of a sampled loop; `files` are that of the certificate and those of pages."""
+    words = {"metric": given.metric, "conditions": given.conditions, "scheduler": given.scheduler}
+    require_nothing_of_a_metric({**given.numbers, **words, "deadline": None}, flag)
+    from tubecert.library import sampled
+    from tubecert.report import text
+    from tubecert.report.sampled_loop import page_of
+
+    target, pages = files
+    with telling.shown(Terminal.stderr(color=output.color), output) as report:
+        found = sampled.certified(system, progress=report, command=_command())
+    if target != certificate.STDOUT:
+        certificate.write_text(target, found.text)
+    write_pages(pages, found.certificate)
+    page, closing = page_of(found.certificate), _closing(given.spec, target, pages, certified=found.certified)
+    data = found.text if _is_data(target, output) else None
+    present(output, text.headline(page), lambda: text.screen(page, closing, verbose=output.verbose), data)
+    return found.verdict.exit_code
+
+
+def _closing(spec: str, target: str, pages: Sequence[str], *, certified: bool) -> list[tuple[str, str]]:
+    """What was written, and the commands that come next."""
+    name = shlex.quote(target)
+    after = [
+        ("next", f"tubecert recheck {name}"),
+        ("", f"tubecert simulate {shlex.quote(spec)} --certificate {name}"),
+        ("", f"tubecert export {name} -o {shlex.quote(Path(spec).stem)}.controller"),
+    ]
+    more = [("more", f"-v here; tubecert report {name}: a page with figures")]
+    return [("certificate", target), *(("page", page) for page in pages), *(after if certified else more)]
+
+
+def _command() -> str:
+    return visible(shlex.join(["tubecert", *sys.argv[1:]]))
 
 
 def _will(found: Synthesised, target: str | None) -> keeper.Will | None:

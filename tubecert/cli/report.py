@@ -13,13 +13,13 @@ from tubecert.cli.options import Output
 from tubecert.cli.targets import refused
 from tubecert.errors import TargetError
 from tubecert.files import STDIN
-from tubecert.library.certification import read
 from tubecert.library.pages import REMEDY, Report, require_page, simulated_in
+from tubecert.library.reading import read
 from tubecert.printable import printable_json, visible
 from tubecert.report.claimed import NOT_RECHECKED
 
 if TYPE_CHECKING:
-    from tubecert.certificate.result import Certificate
+    from tubecert.library.pages import AnyCertificate
     from tubecert.report.page_simulation import Simulated
 
 
@@ -55,7 +55,7 @@ def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) ->
         kept[f"page {page}"] = page
 
 
-def write_pages(pages: Sequence[str], sealed: Certificate, simulated: Simulated | None = None) -> None:
+def write_pages(pages: Sequence[str], sealed: AnyCertificate, simulated: Simulated | None = None) -> None:
     """Write the pages of a certificate. Raises `TargetError`."""
     for page in pages:
         Report(certificate=sealed, simulated=simulated).save(page)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Final, Literal, Never, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, Never, TypeAlias, TypeVar
 
 from tubecert.errors import SpecError
 from tubecert.expression import suggestion
@@ -17,7 +17,9 @@ from tubecert.findings import Finding, NamedPlace
 from tubecert.library.numbers import Numbers
 from tubecert.spec import Setting, Spec, Synthesis
 from tubecert.spec.synthesis import MAX_DEGREE, solver_name
-from tubecert.stages.options import Options
+
+if TYPE_CHECKING:
+    from tubecert.stages.options import Options
 
 T = TypeVar("T", bound=str)
 V = TypeVar("V", int, Fraction)
@@ -26,10 +28,13 @@ _SETS: Final = {
     "epsilon": "tube.epsilon",
     "metric": "metric",
 }  # options by the keys they set
+_OF_A_METRIC: Final = (
+    "rho_a", "epsilon", "metric", "conditions", "bandwidth", "adaptation_rate", "gap", "budget", "deadline",
+    "scheduler",
+)  # fmt: skip
 Named: TypeAlias = Callable[[str], str]
 _BUDGET: Final = 2_000_000  # of a verification
 _GAP: Final = Fraction(1, 1000)
-_USUAL: Final = Options()
 AUTO: Final = "auto"  # the gap of each constant by its effect
 
 
@@ -48,14 +53,17 @@ class CertificationNumbers:
 
     def options(self, *, conditions: str | None, metric: Path | None = None) -> Options:
         """The question, with words and a metric beside the numbers."""
+        from tubecert.stages.options import Options
+
+        usual = Options()
         return Options(
             rho_a=self.rho_a,
             epsilon=self.epsilon,
             bandwidth=self.bandwidth,
             adaptation_rate=self.adaptation_rate,
-            gap=self.gap or _USUAL.gap,
+            gap=self.gap or usual.gap,
             by_effect=self.by_effect,
-            budget=self.budget or _USUAL.budget,
+            budget=self.budget or usual.budget,
             conditions=conditions,
             metric=metric,
         )
@@ -81,6 +89,22 @@ def effort_numbers(given: Mapping[str, str | None]) -> CertificationNumbers:
     """The same where gap and budget are all that is asked with; raises `SpecError`."""
     names = ("rho_a", "epsilon", "deadline", "bandwidth", "adaptation_rate", "gap", "budget")
     return certification_numbers({**dict.fromkeys(names), **given}, str)
+
+
+def require_nothing_of_a_metric(given: Mapping[str, object], named: Named) -> None:
+    """Raises `SpecError` for every argument that means nothing where a specification has `hardware`."""
+    findings = [
+        Finding(
+            code="TC112",
+            message=f"{named(name)} is about a certificate with a metric; the sampled loop is proven without",
+            location=NamedPlace(file=named(name), line=1, column=1),
+            help=f"leave {named(name)} out, or leave hardware out of the specification",
+        )
+        for name in _OF_A_METRIC
+        if given.get(name) is not None
+    ]
+    if findings:
+        raise SpecError(findings)
 
 
 def jobs_of(name: str, given: str | None) -> int | None:

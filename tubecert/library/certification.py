@@ -22,17 +22,16 @@ from tubecert.enclosure.interval import Array
 from tubecert.kinds import name_of
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.library.specification import File, Specification
+from tubecert.library.stated import Stated, array
 from tubecert.records import FormError, Json
 from tubecert.report import gains as report_gains
 from tubecert.report.outline import widths
 from tubecert.report.page import Reason
-from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 from tubecert.words.assumptions import assumed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +69,7 @@ class Points:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Certification:
+class Certification(Stated):
     """What a certification came to, whatever its verdict.
 
     `certificate` has every key of the certificate as a value; `text` is its file. `specification` is what was
@@ -87,26 +86,6 @@ class Certification:
     def result(self) -> Result:
         """What was proven, as the certificate holds it."""
         return self.certificate.result
-
-    @property
-    def verdict(self) -> Verdict:
-        """`certified`, `refuted` or `undecided`."""
-        return self.result.verdict
-
-    @property
-    def certified(self) -> bool:
-        """Whether the tube is certified. Neither refuted nor undecided is: look at `reasons`."""
-        return self.verdict is Verdict.CERTIFIED
-
-    @property
-    def hash(self) -> str:
-        """The hash of all that was proven, assumed and asked."""
-        return self.certificate.hash
-
-    @property
-    def name(self) -> str:
-        """The name of the specification."""
-        return self.result.spec.effective.name
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
@@ -153,7 +132,7 @@ class Certification:
         Bandwidth in rad/s and adaptation rate; (0, 2) where there is none. Raises `KeyError` for no kind.
         """
         section = self.section(kind)
-        return _array([] if section is None else section.points()).reshape(-1, 2)
+        return array([] if section is None else section.points()).reshape(-1, 2)
 
     def section(self, kind: str) -> SectionData | None:
         """All that the certificate says of a kind, by its letter; None if it says nothing of it.
@@ -163,21 +142,6 @@ class Certification:
         return self.result.sections.get(name_of(kind).key)
 
     # the tube
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """The names of the states (n), in the order of every vector."""
-        return self.result.spec.effective.system.states
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The names of the inputs (m)."""
-        return self.result.spec.effective.system.inputs
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """Units of states and inputs, as far as the specification says."""
-        return MappingProxyType(dict(self.result.spec.effective.system.units))
 
     @property
     def rho(self) -> float | None:
@@ -212,24 +176,9 @@ class Certification:
     def plan(self) -> Points | None:
         """Points of the plan, to draw it; None for a family of plans."""
         samples = self.result.plan.samples
-        return None if samples is None else Points(t=_array(samples.t), x=_array(samples.x))
+        return None if samples is None else Points(t=array(samples.t), x=array(samples.x))
 
-    @property
-    def specification(self) -> Specification:
-        """What was certified.
-
-        Of a certificate that was read it is taken from there; raises `TubecertError` if the plan is in a file (CSV)
-        that is not where it was.
-        """
-        if self.given is not None:
-            return self.given
-        return Specification(spec=load_text(file.dump(self.result.spec.effective.data), "<certificate>"))
-
-    # files, figures
-
-    def save(self, path: File) -> None:
-        """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`."""
-        file.write_text(os.fspath(path), self.text, "choose another file")
+    # figures
 
     def plot_tube(self, ax: Axes | None = None, *, states: tuple[str, str] | None = None) -> Axes:
         """Draw plan, tube, safe set and obstacles in the plane of two states (the first two); returns the axes.
@@ -254,9 +203,6 @@ class Certification:
 
         return console.verdict_line(self.result).plain
 
-    def __repr__(self) -> str:
-        return f"<Certification: {self}>"
-
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
@@ -267,13 +213,13 @@ class Certification:
 
 
 def read(path: File) -> Certification:
-    """The certificate in a file that `save` or `tubecert certify` wrote.
-
-    Raises `TargetError` for a file that is none, or that was changed afterwards. Its claims are not examined: that is
-    what `recheck` does.
-    """
+    """The certificate in a file, of a loop that rests on a metric; raises `TargetError` for any other."""
     source = os.fspath(path)
-    sealed = file.load(source)
+    return read_sealed(file.load(source), source)
+
+
+def read_sealed(sealed: Json, source: str) -> Certification:
+    """The same of its JSON, whose format and hash are right; raises `TargetError` where it is no result."""
     try:
         return certification_of(sealed)
     except FormError as error:  # with a hash that is right: somebody sealed what is no result
@@ -302,10 +248,3 @@ def _gains(row: report_gains.Gains) -> Gains:
 
 def _float(value: Fraction | None) -> float | None:
     return None if value is None else float(value)
-
-
-def _array(values: ArrayLike) -> Array:
-    """The values as an array that nobody writes to."""
-    found = np.array(values, dtype=float)
-    found.flags.writeable = False
-    return found

@@ -8,8 +8,9 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tubecert import certificate, pipeline
+from tubecert import certificate
 from tubecert.executor import Executor, held
 from tubecert.letters import ALL, words_of
 from tubecert.libraries import versions
@@ -19,19 +20,22 @@ from tubecert.library.asked import (
     jobs_of,
     one_of,
     refuse,
+    require_nothing_of_a_metric,
     require_once,
 )
-from tubecert.library.certification import Certification, certification_of
-from tubecert.library.metrics import MetricLike, with_metric
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.specification import Specifiable, Specification, spec_of
 from tubecert.library.workers import workers_of
-from tubecert.pipeline import Options
-from tubecert.pipeline.synthesised import Synthesised
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
 from tubecert.spec import Spec
-from tubecert.stages.options import overridden
+
+if TYPE_CHECKING:
+    from tubecert.library.certification import Certification
+    from tubecert.library.metrics import MetricLike
+    from tubecert.library.sampled import SampledCertification
+    from tubecert.pipeline.synthesised import Synthesised
+    from tubecert.stages.options import Options
 
 
 def certify(
@@ -49,8 +53,11 @@ def certify(
     jobs: int = 1,
     scheduler: str | None = None,
     progress: Progress | None = None,
-) -> Certification:
+) -> Certification | SampledCertification:
     """Prove the tube around the plan and find the smallest gains: `tubecert certify`, with the same options.
+
+    A specification with `hardware` is about the sampled loop: then the controller that is proven is found as well, and
+    of the options only `progress` means something.
 
     `metric` stands in for the specification's own: a file, a mapping with `rate` and `dual_metric`, or what
     `synthesise` found. `conditions`: the letter of the certificate that decides the verdict, or `all`. `progress` is
@@ -72,9 +79,17 @@ def certify(
     numbers = certification_numbers(texts, str)
     _check_words(conditions, numbers)
     whole = spec_of(spec)
+    if whole.hardware is not None:
+        given = {**texts, "metric": metric, "conditions": conditions, "scheduler": scheduler}
+        require_nothing_of_a_metric(given, str)
+        from tubecert.library import sampled
+
+        return sampled.certified(whole, progress=timed(progress), command="tubecert.certify")
     require_once(whole, {**texts, "metric": metric})
     options = numbers.options(conditions=conditions)
     if metric is not None:
+        from tubecert.library.metrics import with_metric
+
         whole, name = with_metric(whole, metric)
         options = replace(options, metric=Path(name))
     return certified(
@@ -101,6 +116,10 @@ def certified(
 
     `kept` hears what a search for a metric has; `workers` share long searches.
     """
+    from tubecert import pipeline
+    from tubecert.library.certification import certification_of
+    from tubecert.stages.options import overridden
+
     started, clock = datetime.now(UTC), time.perf_counter()
     deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
     with held(workers) as helpers:

@@ -6,17 +6,26 @@ import json
 import os
 from dataclasses import dataclass, field
 from html import escape
-from typing import Final
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from tubecert import files
 from tubecert.certificate.file import write_text
-from tubecert.certificate.result import Certificate
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
-from tubecert.library.certification import Certification, read
+from tubecert.library.reading import read
 from tubecert.library.specification import File
 from tubecert.records import OPEN, FormError, from_json
+from tubecert.report import html, markdown
+from tubecert.report.page import Page
 from tubecert.report.page_simulation import TITLES, Simulated
+from tubecert.sampled_loop.record import Certificate as SampledCertificate
+
+if TYPE_CHECKING:
+    from tubecert.certificate.result import Certificate
+    from tubecert.library.certification import Certification
+    from tubecert.library.sampled import SampledCertification
+
+AnyCertificate: TypeAlias = "Certificate | SampledCertificate"
 
 HTML, MARKDOWN = (".html", ".htm"), (".md", ".markdown")
 _FOLDER: Final = files.Kind(
@@ -32,22 +41,18 @@ REMEDY: Final = "give a file FILE.html or FILE.md in a folder that exists"
 class Report:
     """The page of a certificate; the same for the same certificate."""
 
-    certificate: Certificate = field(repr=False)
+    certificate: AnyCertificate = field(repr=False)
     simulated: Simulated | None = field(default=None, repr=False)
 
     @property
     def html(self) -> str:
         """The page as one HTML file that needs nothing else."""
-        from tubecert.report import html
-
-        return html.render(self.certificate, self.simulated)
+        return html.render_page(self._page())
 
     @property
     def markdown(self) -> str:
         """The same words and tables as Markdown, without figures."""
-        from tubecert.report import markdown
-
-        return markdown.render(self.certificate)
+        return markdown.render_page(self._page())
 
     def save(self, path: File) -> None:
         """Write the page: FILE.html or FILE.md. Raises `TargetError`."""
@@ -57,22 +62,29 @@ class Report:
         write_text(target, text, REMEDY)
 
     def __repr__(self) -> str:
-        from tubecert.report import console
-
-        return f"<Report: a page about {console.name(self.certificate.result)}>"
+        return f"<Report: a page about {self.certificate.result.spec.effective.name}>"
 
     def _repr_html_(self) -> str:
         """The page in a frame of its own: its style touches nothing around it."""
         style = "width: 100%; height: 45em; border: 1px solid #8884"
         return f'<iframe srcdoc="{escape(self.html)}" style="{style}" title="tubecert certificate"></iframe>'
 
+    def _page(self) -> Page:
+        if isinstance(self.certificate, SampledCertificate):
+            from tubecert.report.sampled_loop import page_of
 
-def report(result: Certification | File, *, simulation: File | None = None) -> Report:
+            return page_of(self.certificate)
+        from tubecert.report import page_sections
+
+        return page_sections.page_of(self.certificate, self.simulated)
+
+
+def report(result: Certification | SampledCertification | File, *, simulation: File | None = None) -> Report:
     """The page of a certificate, or of the file of one: `tubecert report`. Raises `TargetError`.
 
     `simulation` is a folder that `tubecert simulate` wrote for this certificate; its figures are shown in HTML.
     """
-    found = result if isinstance(result, Certification) else read(result)
+    found = read(result) if isinstance(result, (str, os.PathLike)) else result
     shown = None if simulation is None else simulated_in(os.fspath(simulation), found.certificate)
     return Report(certificate=found.certificate, simulated=shown)
 
@@ -88,7 +100,7 @@ class _Summary:
 OPEN.add(_Summary)
 
 
-def simulated_in(folder: str, certificate: Certificate) -> Simulated:
+def simulated_in(folder: str, certificate: AnyCertificate) -> Simulated:
     """What a folder of `simulate` shows; raises `TargetError` for another folder, and for another certificate's."""
     text = files.read(os.path.join(folder, "summary.json"), _FOLDER)
     try:

@@ -1,6 +1,6 @@
 """A page as HTML: one file that needs nothing else, with no script, for screens wide and narrow, light, dark and paper.
 
-In: a certificate. Out: the text of the page, the same for the same certificate. The template escapes every text;
+In: a page. Out: the text of the page, the same for the same page. The template escapes every text;
 only the drawings, which `figures_axes` writes as well-formed SVG, and the style sheet are put in as they are.
 """
 
@@ -9,18 +9,10 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from tubecert.certificate.result import Certificate
 from tubecert.report.page import Page, typeset
-from tubecert.report.page_sections import page_of
-from tubecert.report.page_simulation import Simulated
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-
-
-def render(certificate: Certificate, simulated: Simulated | None = None) -> str:
-    """The page of a certificate."""
-    return render_page(page_of(certificate, simulated))
 
 
 def render_page(page: Page) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from tubecert.certificate.result import Certificate
 from tubecert.printable import visible
 from tubecert.report.page import (
     Block,
@@ -20,17 +19,11 @@ from tubecert.report.page import (
     Words,
     typeset,
 )
-from tubecert.report.page_sections import page_of
 
 _SPECIAL = re.compile(r"[\\`*_\[\]<>|~&$]|(?<=\w):(?=//)|(?<=www)\.")
 _AT_START = re.compile(
     r"(?:#{1,6}|[-+]|\d{1,9}[.)])(?=\s|$)|[-=]+$"
 )  # of a heading, a list, the line below a heading
-
-
-def render(certificate: Certificate) -> str:
-    """The page of a certificate."""
-    return render_page(page_of(certificate))
 
 
 def render_page(page: Page) -> str:

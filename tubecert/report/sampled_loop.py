@@ -12,8 +12,8 @@ from typing import Final
 from tubecert.digits import down, exact, short, up
 from tubecert.report.claimed import NOT_RECHECKED, started
 from tubecert.report.figures_sampled import figures, period
-from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Section, Table, Tile
-from tubecert.sampled_loop.record import Certificate, InputUse, Notes, Result
+from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Reason, Section, Table, Tile
+from tubecert.sampled_loop.record import Certificate, InputUse, Notes, Result, Shares
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import assumed, extent, family, filling, loop, plan, promise, remedy, why
 
@@ -107,7 +107,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     """Half-widths at the start, in the long run, as wished; `notes` say what fills them, inputs as well."""
     system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
     stages = result.tube if notes or len(result.tube) < 2 else (result.tube[0], result.tube[-1])
-    filled = {**notes.start, **notes.long_run, **notes.deviations} if notes else {}
+    filled = _all_shares(notes) if notes else {}
     when = (f"t >= {short(stage.start * period(result), 4)} s" for stage in stages)
     grid = [["half-widths", *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
     for name in (*names, *(system.inputs if notes else ())):
@@ -139,10 +139,11 @@ def _inputs(result: Result) -> Iterator[tuple[str, str]]:
 def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     """What fills the tube of the state that is widest beside its wish, or else beside the safe set."""
     wishes, safe = result.spec.effective.tube.half_widths, result.spec.effective.part("safe_set")
+    wished = [name for name in wishes if name in safe]
     sizes = {
-        name: width / (wishes[name] if wishes else Fraction(safe[name][1]) - Fraction(safe[name][0]))
+        name: width / (wishes[name] if wished else Fraction(safe[name][1]) - Fraction(safe[name][0]))
         for name, width in (result.tube[-1].half_widths.items() if result.tube else ())
-        if name in notes.long_run and name in (wishes or safe)
+        if name in notes.long_run and name in (wished or safe)
     }
     if sizes:
         name = max(sizes, key=lambda name: sizes[name])
@@ -160,7 +161,7 @@ def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
 def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     """What fills that which lacks, and what would help; of a certified tube also which wish it misses."""
     for lack in result.lacks:
-        shares = {**notes.start, **notes.long_run, **notes.deviations}.get(lack.where)
+        shares = _all_shares(notes).get(lack.where)
         if result.verdict is Verdict.CERTIFIED:
             yield "missed", why(lack)
         if shares is not None:
@@ -177,3 +178,22 @@ def _origin(certificate: Certificate) -> Facts:
         )
     rows += [(name, str(told)) for name, told in certificate.run.items() if not isinstance(told, dict)]
     return _facts(rows)
+
+
+def reasons(certificate: Certificate) -> tuple[Reason, ...]:
+    """What is lacking, each with what would help."""
+    shares = _all_shares(certificate.notes)
+    return tuple(
+        Reason(
+            verdict=Verdict.UNDECIDED,
+            claim=lack.kind.replace("_", " "),
+            message=why(lack),
+            relax=remedy(lack, shares.get(lack.where)),
+        )
+        for lack in certificate.result.lacks
+    )
+
+
+def _all_shares(notes: Notes) -> dict[str, Shares]:
+    """By state, in the long run where it is known, and by input."""
+    return {**notes.start, **notes.long_run, **notes.deviations}

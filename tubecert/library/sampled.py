@@ -1,0 +1,202 @@
+"""Certification of a sampled loop from code: its certificate as a value, and its controller, sample by sample.
+
+In: a specification with `hardware`, or a certificate. Out: views of what the certificate says; nothing is decided here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from fractions import Fraction
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.library.specification import Specification
+from tubecert.library.stated import Stated, array
+from tubecert.progress import Progress
+from tubecert.sampled_loop.file import certificate_text
+from tubecert.sampled_loop.record import Certificate, Result, Shares
+from tubecert.spec import Spec
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from tubecert.controller.data import Data
+    from tubecert.report.page import Reason
+
+_ON_TIME: Final = 1e-6  # of a sample time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tube:
+    """The tube over time: `t` (K,) in s, `lower` and `upper` (K, n) of every state, around `plan` (K, n).
+
+    Where a later stage begins, its time occurs twice. The points of the plan are notes, which recheck does not examine.
+    """
+
+    t: Array
+    lower: Array
+    upper: Array
+    plan: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampledCertification(Stated):
+    """What the certification of a sampled loop came to, whatever its verdict.
+
+    `certificate` has every key of the certificate as a value; `text` is its file. `given` is what was asked about.
+    """
+
+    certificate: Certificate = field(repr=False)
+    text: str = field(repr=False)
+    given: Specification | None = field(default=None, repr=False)
+
+    @property
+    def result(self) -> Result:
+        """What was proven, as the certificate holds it."""
+        return self.certificate.result
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """What is lacking, in words: `claim`, `message` and `relax` (what would help)."""
+        from tubecert.report.sampled_loop import reasons
+
+        return reasons(self.certificate)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What the claim rests on and does not show, in words."""
+        from tubecert.words.sampled_loop import assumed
+
+        return tuple(assumed(self.result))
+
+    @property
+    def half_widths(self) -> Mapping[str, float]:
+        """How far each state can be from the plan at any time, in its unit; empty if nothing is proven."""
+        from tubecert.report.sampled_loop import half_widths
+
+        return _rounded_up(half_widths(self.result))
+
+    @property
+    def start(self) -> Mapping[str, float]:
+        """The same from the first sample on, until the tube gets narrower."""
+        return _rounded_up(self.result.tube[0].half_widths if self.result.tube else {})
+
+    @property
+    def long_run(self) -> Mapping[str, float]:
+        """The same in the long run, when the start is forgotten: from sample `result.tube[-1].start` on."""
+        return _rounded_up(self.result.tube[-1].half_widths if self.result.tube else {})
+
+    @property
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """What each input stays within, plan and controller together: from below and from above, in its unit."""
+        return MappingProxyType(
+            {use.input: (-_up(-use.range[0]), _up(use.range[1])) for use in self.result.inputs}
+        )
+
+    @property
+    def shares(self) -> Mapping[str, Mapping[str, float]]:
+        """What fills the tube of each state in the long run: shares that add up to 1. Notes, which are not examined."""
+        return MappingProxyType({name: _parts(own) for name, own in self.certificate.notes.long_run.items()})
+
+    @property
+    def tube(self) -> Tube | None:
+        """The tube over time; None for a family of plans, and if nothing is proven."""
+        from tubecert.report.figures_sampled import band
+
+        t, x, widths = band(self.certificate)
+        return (
+            Tube(t=array(t), lower=array(x - widths), upper=array(x + widths), plan=array(x))
+            if t.size
+            else None
+        )
+
+    def controller(self) -> SampledController:
+        """The proven controller, from its first sample on; a new one for every run.
+
+        Raises `TubecertError` if nothing is certified, or without a controller.
+        """
+        from tubecert.controller.data import data_of
+
+        return SampledController(data_of(self.certificate))
+
+    def __str__(self) -> str:
+        from tubecert.report.sampled_loop import page_of
+        from tubecert.report.text import headline
+
+        return headline(page_of(self.certificate)).plain
+
+    def _repr_html_(self) -> str:
+        from tubecert.report import notebook
+        from tubecert.report.sampled_loop import page_of
+
+        return notebook.of_page(page_of(self.certificate))
+
+
+class SampledController:
+    """The recursion of a certificate's tables in numpy: `u = controller(t, y)` once a sample, beginning with t = 0.
+
+    What is exported in C computes the same, and also judges samples and clips inputs.
+    """
+
+    def __init__(self, data: Data) -> None:
+        self.sample_time = float(data.sample_time)
+        self.samples = 0
+        self._data, self._row, self._zeta = data, 0, np.zeros(data.sizes[2])
+
+    def __call__(
+        self, t: float, y: ArrayLike, x: ArrayLike | None = None, u: ArrayLike | None = None
+    ) -> Array:
+        """The input (m,) for the state (n,) that is measured at t, in s; it acts after the delay, for a sample time.
+
+        Of a family the plan comes with every sample: x* at t (n,), and u* (m,) as it is held while the input acts.
+        Raises `ValueError` if t is not the time of the next sample, if a plan is missing, or is over.
+        """
+        at, plan = self._data.plan.at, self._data.plan
+        if abs(t / self.sample_time - self.samples) > _ON_TIME * (1 + self.samples):
+            raise ValueError(f"the next sample is at t = {self.samples * self.sample_time} s")
+        if (at is None) is (x is None or u is None):
+            raise ValueError("x and u are given for a family of plans, and only there")
+        if self._row >= plan.steps:
+            raise ValueError("the plan is over, and nothing is proven for later")
+        given = at([self._row]) if at is not None else (np.asarray(x, float), np.asarray(u, float))
+        own_x, own_u = map(np.ravel, given)
+        tables, off = self._data.tables, np.asarray(y, float) - own_x
+        command = own_u + tables["M"] @ self._zeta + tables["N"] @ off
+        self._zeta = tables["F"] @ self._zeta + tables["G"] @ off
+        self.samples, self._row = self.samples + 1, self._row + 1
+        if self._row >= plan.steps:
+            self._row = plan.after
+        return np.asarray(command)
+
+
+def certified(spec: Spec, *, progress: Progress | None, command: str) -> SampledCertification:
+    """The sealed answer for a specification with `hardware`; `command` is noted as its origin."""
+    from tubecert.loop_design.certification import certify
+
+    found = certify(spec, settings=dict(spec.settings), report=progress, command=command)
+    return certification_of(found, Specification(spec=spec))
+
+
+def certification_of(certificate: Certificate, given: Specification | None = None) -> SampledCertification:
+    """A sealed certificate as a value."""
+    return SampledCertification(certificate=certificate, text=certificate_text(certificate), given=given)
+
+
+def _rounded_up(values: Mapping[str, Fraction]) -> Mapping[str, float]:
+    return MappingProxyType({name: _up(value) for name, value in values.items()})
+
+
+def _up(value: Fraction) -> float:
+    """The least float that is not below, or the next one."""
+    near = float(value)
+    return near if Fraction(near) >= value else float(np.nextafter(near, np.inf))
+
+
+def _parts(shares: Shares) -> Mapping[str, float]:
+    parts = {item.name: float(getattr(shares, item.name)) for item in fields(shares)}
+    whole = sum(parts.values()) or 1.0
+    return MappingProxyType({name: part / whole for name, part in parts.items()})

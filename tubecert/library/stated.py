@@ -1,0 +1,109 @@
+"""What every certificate says, whatever is proven by it: the base of its values for code."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tubecert.certificate import file
+from tubecert.certificate.effective import Effective
+from tubecert.enclosure.interval import Array
+from tubecert.library.specification import File, Specification
+from tubecert.spec import load_text
+from tubecert.verdict import Verdict
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from tubecert.certificate.result import Certificate
+    from tubecert.sampled_loop.record import Certificate as SampledCertificate
+
+
+class Stated:
+    """A certificate as a value: `text` is its file, `given` the specification as it was asked about, if it was."""
+
+    __slots__ = ()
+
+    @property
+    def certificate(self) -> Certificate | SampledCertificate:
+        """Every key of the certificate as a value."""
+        raise NotImplementedError
+
+    @property
+    def text(self) -> str:
+        """The text of its file."""
+        raise NotImplementedError
+
+    @property
+    def given(self) -> Specification | None:
+        """What was asked about; None of a certificate that was read."""
+        raise NotImplementedError
+
+    @property
+    def effective(self) -> Effective:
+        """The specification as the certificate holds it."""
+        return self.certificate.result.spec.effective
+
+    @property
+    def verdict(self) -> Verdict:
+        """`certified`, `refuted` or `undecided`."""
+        return self.certificate.result.verdict
+
+    @property
+    def certified(self) -> bool:
+        """Whether the tube is certified. Neither refuted nor undecided is: look at `reasons`."""
+        return self.verdict is Verdict.CERTIFIED
+
+    @property
+    def hash(self) -> str:
+        """The hash of all that was proven, assumed and asked."""
+        return self.certificate.hash
+
+    @property
+    def name(self) -> str:
+        """The name of the specification."""
+        return self.effective.name
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The names of the states (n), in the order of every vector."""
+        return self.effective.system.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the inputs (m)."""
+        return self.effective.system.inputs
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of states and inputs, as far as the specification says."""
+        return MappingProxyType(dict(self.effective.system.units))
+
+    @property
+    def specification(self) -> Specification:
+        """What was certified.
+
+        Of a certificate that was read it is taken from there; raises `TubecertError` if the plan is in a file (CSV)
+        that is not where it was.
+        """
+        if self.given is not None:
+            return self.given
+        return Specification(spec=load_text(file.dump(self.effective.data), "<certificate>"))
+
+    def save(self, path: File) -> None:
+        """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`."""
+        file.write_text(os.fspath(path), self.text, "choose another file")
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self}>"
+
+
+def array(values: ArrayLike) -> Array:
+    """The values as an array that nobody writes to."""
+    found = np.array(values, dtype=float)
+    found.flags.writeable = False
+    return found
