@@ -15,19 +15,19 @@ import numpy as np
 from tubecert.digits import up
 from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.record import Recipe, Stage
+from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Dynamics, Responses
 from tubecert.sampled_loop.setting import Controller, Loop
 from tubecert.sampled_loop.theorem import MOST_LAGS, Boxes, Inequalities
 
-_FORGOTTEN: Final = 1e-5  # what is left of the oldest sample that counts
+_FORGOTTEN: Final = 1e-4  # what is left of the oldest sample that counts
 _FEWEST: Final = 8
-_WINDOWS: Final = 256
 _PARTS: Final = (2, 4, 8, 16)
 _SETTLED: Final = 5e-3  # finer pieces that gain less are not worth it
 _STEPS: Final = 60
 _LARGE: Final = 1e6
-_STEADY: Final = 0.97  # a first stage that is this near to the last is the only one
-_STAGES: Final = (64, 32, 16, 8, 4, 2, 1)
+_STEADY: Final = 0.9  # a long run that is not narrower than this of the tube is no stage of its own
+_STAGES: Final = (32, 8, 3, 1)
 _DIGITS: Final = 5
 
 Report = Callable[[int, Array], None]
@@ -42,26 +42,53 @@ class NoTubeError(ValueError):
 
 
 def propose(
-    loop: Loop, controller: Controller, report: Report | None = None
+    remainders: Remainders, controller: Controller, report: Report | None = None
 ) -> tuple[Inequalities, tuple[Stage, ...]]:
     """Stages that should hold, with the inequalities that say so. Raises `NoTubeError`."""
+    loop = remainders.loop
+    lags = _lags(loop, controller)
+    outputs = loop.states + loop.inputs + controller.size
     recipe = Recipe(
-        lags=_lags(loop, controller),
-        cuts=(),
+        lags=lags,
+        cuts=((lags,) * loop.H.shape[1],) * outputs,
         pieces=_PARTS[0],
         panels=_PARTS[0],
-        windows=_WINDOWS,
+        windows=remainders.windows,
         parameters="slow" if loop.slow else "sudden",
     )
-    found = _solved(loop, controller, recipe, report)
+    rough = _inequalities(remainders, controller, recipe)
+    found = rough.again(cuts=_cuts(rough))
+    boxes = _fixed_point(found, _nothing(found), report)
     for parts in _PARTS[1:]:
-        finer = _solved(loop, controller, replace(recipe, pieces=parts, panels=parts), report)
-        gained = np.max(1 - finer[1].W / np.maximum(found[1].W, 1e-300))
+        finer = _inequalities(remainders, controller, replace(found.recipe, pieces=parts, panels=parts))
+        gained = np.max(1 - finer.of(boxes).W / np.maximum(found.of(boxes).W, 1e-300))
         if gained < _SETTLED:
             break
         found = finer
-    inequalities, boxes = found
-    return inequalities, _stages(loop, boxes, inequalities.starts)
+    boxes = _fixed_point(found, boxes, report)
+    several, many = _in_stages(found, report)
+    if many is not None and (many.W[-1] < _STEADY * many.W.max(axis=0)).any():
+        found, boxes = several, many
+    return found, _stages(loop, boxes, found.starts)
+
+
+def _inequalities(remainders: Remainders, controller: Controller, recipe: Recipe) -> Inequalities:
+    made = Responses(
+        remainders.loop, controller, lags=recipe.lags, pieces=recipe.pieces, panels=recipe.panels
+    )
+    return Inequalities(controller, recipe, (0,), made, remainders)
+
+
+def _in_stages(found: Inequalities, report: Report | None) -> tuple[Inequalities, Boxes | None]:
+    """Narrower and narrower stages, where a start or an h that begins at 0 has something to forget."""
+    loop, lags = found.loop, found.recipe.lags
+    starts = sorted({0, *(lags // part for part in _STAGES if lags // part > loop.whole)})
+    if loop.samples is not None:
+        starts = [k for k in starts if k < loop.samples]
+    if len(starts) == 1 or not (loop.start.reach.any() or loop.matched):
+        return found, None
+    several = found.again(starts=starts)
+    return several, _fixed_point(several, _nothing(several), report)
 
 
 def _lags(loop: Loop, controller: Controller) -> int:
@@ -75,36 +102,12 @@ def _lags(loop: Loop, controller: Controller) -> int:
     return int(min(most, max(_FEWEST, np.ceil(wanted) + 2 * (loop.whole + 2))))
 
 
-def _solved(
-    loop: Loop, controller: Controller, recipe: Recipe, report: Report | None
-) -> tuple[Inequalities, Boxes]:
-    """The fixed point with as many stages as the start asks for."""
-    made = Responses(loop, controller, lags=recipe.lags, pieces=recipe.pieces, panels=recipe.panels)
-    rough = Inequalities(loop, controller, _uncut(loop, controller, recipe), (0,), made)
-    rough = rough.again(cuts=_cuts(rough, made))
-    if not loop.start.reach.any() and not loop.matched:
-        return rough, _fixed_point(rough, report)
-    starts = sorted({0, *(recipe.lags // part for part in _STAGES if recipe.lags // part > loop.whole)})
-    if loop.samples is not None:
-        starts = [k for k in starts if k < loop.samples]
-    several = rough.again(starts=starts)
-    boxes = _fixed_point(several, report)
-    if (boxes.W[-1] >= _STEADY * boxes.W[0]).all() and (boxes.U[-1] >= _STEADY * boxes.U[0]).all():
-        return rough, _fixed_point(rough, report)
-    return several, boxes
-
-
-def _uncut(loop: Loop, controller: Controller, recipe: Recipe) -> Recipe:
-    outputs = loop.states + loop.inputs + controller.size
-    return replace(recipe, cuts=((recipe.lags,) * loop.H.shape[1],) * outputs)
-
-
-def _cuts(inequalities: Inequalities, made: Responses) -> tuple[tuple[int, ...], ...]:
+def _cuts(inequalities: Inequalities) -> tuple[tuple[int, ...], ...]:
     """The lag from which on eta's size costs less than its rate, for every output and component."""
-    n = inequalities.loop.states
+    n, made = inequalities.loop.states, inequalities.responses
     nothing = _nothing(inequalities)
     _, sizes = inequalities.phases(nothing)
-    first = made.count - (made.count - n * len(made.nodes))  # rows of e at the last node, then delta and zeta
+    first = n * len(made.nodes)  # rows of e at the last node stand before it, then delta and zeta
     rows = np.r_[first - n : first, first : made.count]
     cost = (
         made.rate[:, rows] * sizes.rate
@@ -125,9 +128,8 @@ def _nothing(inequalities: Inequalities) -> Boxes:
     )
 
 
-def _fixed_point(inequalities: Inequalities, report: Report | None) -> Boxes:
-    """The least boxes that the inequalities map into themselves, by going up from nothing."""
-    boxes = _nothing(inequalities)
+def _fixed_point(inequalities: Inequalities, boxes: Boxes, report: Report | None) -> Boxes:
+    """Boxes that the inequalities map into themselves, going on from some."""
     widest = np.array([float(high - low) for low, high in inequalities.loop.spec.safe_set])
     with np.errstate(all="ignore"):
         for step in range(_STEPS):
@@ -136,10 +138,8 @@ def _fixed_point(inequalities: Inequalities, report: Report | None) -> Boxes:
                 report(step, found.W[-1])
             if not np.isfinite(found.W).all() or (widest < found.W).any():
                 raise NoTubeError(found.W[0])
-            settled = all(
-                (new <= old * (1 + 1e-4) + 1e-300).all()
-                for new, old in ((found.W, boxes.W), (found.U, boxes.U), (found.Z, boxes.Z))
-            )
+            pairs = ((found.W, boxes.W), (found.U, boxes.U), (found.Z, boxes.Z))
+            settled = all((np.abs(new - old) <= 1e-4 * new + 1e-300).all() for new, old in pairs)
             if settled:
                 return found
             boxes = found

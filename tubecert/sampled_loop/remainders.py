@@ -15,12 +15,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
-from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import ZERO, Expression, derivatives, symbol
+from tubecert.expression import Expression, derivatives, symbol
 from tubecert.expression.matrix import column, combine, jacobian, multiply
 from tubecert.model import TIME
 from tubecert.sampled_loop.cells import (
@@ -36,17 +34,12 @@ from tubecert.sampled_loop.setting import PLAN_ROUNDING, Loop
 from tubecert.trajectory.family import Family
 
 _LEVELS: Final = 4
-_DEFECT: Final = Effort(gap=0.05, absolute=1e-9, budget=20_000)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Amplitudes:
-    """What the inequalities need of the tube: suprema, from above.
+class Sizes:
+    """Suprema of |eta|, |eta'|, |eta(0)|, (r,) each, from above."""
 
-    `rho` (n + m,): through I and through the columns of B; `size`, `rate`, `first` (r,): |eta|, |eta'|, |eta(0)|.
-    """
-
-    rho: Array
     size: Array
     rate: Array
     first: Array
@@ -56,7 +49,7 @@ class Remainders:
     """The suprema of one loop over its plan, split into `windows`."""
 
     def __init__(self, loop: Loop, windows: int) -> None:
-        self.loop = loop
+        self.loop, self.windows = loop, windows
         self.cells = cells_of(loop, windows)
         names = (*loop.model.states, *loop.model.inputs)
         self._names = (*names, *(name for name, _ in loop.model.parameters))
@@ -116,17 +109,9 @@ class Remainders:
     @cached_property
     def defect(self) -> Array:
         """sup |x*_i' - F_i(x*, u*, p0)|, (n,), and what stays of it in a point where the plan rests."""
-        plan, model = self.loop.plan, self.loop.model
-        if isinstance(plan, Family):
-            return np.full(self.loop.states, fraction_bounds(plan.limit)[1])
-        rows = [row[0] for row in plan.defect(model)]
-        found = [
-            0.0 if e is ZERO else supremum(SumOfNorms([((e,),)], plan.fixed), plan.domain, _DEFECT).above
-            for e in rows
-        ]
         end = end_of(self.loop)
         rest = 0.0 if end is None else self._run(self._field, end.x, end.u).magnitude[:, 0]
-        return np.asarray(np.maximum(np.array(found), rest))
+        return np.asarray(np.maximum(self.loop.defect, rest))
 
     @cached_property
     def speed(self) -> Interval:
@@ -136,11 +121,6 @@ class Remainders:
         return own + Interval(-reach, reach)
 
     # -- on the tube -------------------------------------------------------------------------------------------------
-
-    def on(self, W: Array, U: Array, whole: Array) -> Amplitudes:
-        """The suprema where |e| <= W and |delta| <= U; those of eta where |e| <= `whole`, W of every stage."""
-        size, rate, first = self._eta(whole)
-        return Amplitudes(self._rho(W, U, size), size, rate, first)
 
     def variation(self) -> Array:
         """sup |F_z - (A, B)| along the plan itself, (n, n + m), z = (x, u)."""
@@ -155,7 +135,8 @@ class Remainders:
         Fz = both[0].reshape(n, n + m)
         return Fz[:, :n], Fz[:, n:], both[1].reshape(n, -1)
 
-    def _rho(self, W: Array, U: Array, size: Array) -> Array:
+    def rho(self, W: Array, U: Array, size: Array) -> Array:
+        """What is left where |e| <= W, |delta| <= U, |eta| <= size: through I and the columns of B, (n + m,)."""
         loop, x = self.loop, self.cells.x
         n = loop.states
         weights = np.concatenate([W, U + self.held]) * (1 + 1e-15)
@@ -229,8 +210,8 @@ class Remainders:
 
     # -- the components of eta ---------------------------------------------------------------------------------------
 
-    def _eta(self, W: Array) -> tuple[Array, Array, Array]:
-        """|eta|, |eta'| and |eta(0)|, (r,) each, in the order of the columns of H."""
+    def sizes(self, W: Array) -> Sizes:
+        """Of eta in the order of the columns of H, where |e| <= W."""
         loop = self.loop
         parts = [] if loop.jumps or not loop.matched else [self._uncertainty(W)]
         if loop.sways:
@@ -243,9 +224,8 @@ class Remainders:
             parts.append((self._strangeness[:, 0], self._strange_rate, self._strangeness[:, 0]))
         if not parts:
             nothing = np.zeros(0)
-            return nothing, nothing, nothing
-        size, rate, first = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return size, rate, first
+            return Sizes(nothing, nothing, nothing)
+        return Sizes(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def _uncertainty(self, W: Array) -> tuple[Array, Array, Array]:
         """Of h: its size on the tube, its rate along the plan, its size on the plan at time 0."""

@@ -14,19 +14,23 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import Range
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
+from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.outward import number_above
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import Expression, constant, free_symbols
+from tubecert.expression import ZERO, Expression, constant, free_symbols
 from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.sampled_loop.midrad import Known
 from tubecert.sampled_loop.record import Afterwards, HexMatrix, Hold, PlanKnots, Tables
 from tubecert.spec import Spec
 from tubecert.spec.types import Hardware, Vector
+from tubecert.trajectory.family import Family
 from tubecert.trajectory.plan import Plan
 
 ROUNDING: Final = {"single": 2.0**-24, "double": 2.0**-53}
+_DEFECT: Final = Effort(gap=0.05, absolute=1e-9, budget=20_000)
 PLAN_ROUNDING: Final = 2.0**-24
 """The controller's x* and u* are off by at most this of their largest size along the plan."""
 
@@ -245,6 +249,20 @@ class Loop:
             return whole and knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
         period = time_period([*self.plan.x, *self.plan.u])
         return period is not None and bool(period.hi <= fraction_bounds(end)[0])
+
+    @cached_property
+    def defect(self) -> Array:
+        """sup |x*_i' - F_i(x*, u*, p0)| while the plan moves, (n,)."""
+        if isinstance(self.plan, Family):
+            return np.full(self.states, fraction_bounds(self.plan.limit)[1])
+        domain, fixed = self.plan.domain, self.plan.fixed
+        rows = [row[0] for row in self.plan.defect(self.model)]
+        return np.array(
+            [
+                0.0 if e is ZERO else supremum(SumOfNorms([((e,),)], fixed), domain, _DEFECT).above
+                for e in rows
+            ]
+        )
 
     @cached_property
     def start(self) -> Start:

@@ -28,7 +28,7 @@ from tubecert.sampled_loop.cells import MOST
 from tubecert.sampled_loop.midrad import SUMMED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
 from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage
-from tubecert.sampled_loop.remainders import Amplitudes, Remainders
+from tubecert.sampled_loop.remainders import Remainders, Sizes
 from tubecert.sampled_loop.responses import Responses, weighed
 from tubecert.sampled_loop.setting import PLAN_ROUNDING, Controller, Loop
 from tubecert.trajectory.family import Family
@@ -70,11 +70,9 @@ class Boxes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Phase:
-    """Samples from `start` on with one stage and the same commands acting; `rho` and `xi` are those of its tube."""
+    """Samples from `start` on with one stage and the same commands acting: remainders, and the box of xi."""
 
     start: int
-    stage: int
-    U: Array
     rho: Array
     core: Array
     eta: Array
@@ -84,12 +82,16 @@ class Inequalities:
     """All b_o(k) of one loop, controller and recipe, for any tube: it is monotone in the tube."""
 
     def __init__(
-        self, loop: Loop, controller: Controller, recipe: Recipe, starts: Sequence[int], responses: Responses
+        self,
+        controller: Controller,
+        recipe: Recipe,
+        starts: Sequence[int],
+        responses: Responses,
+        remainders: Remainders,
     ) -> None:
-        self.loop, self.controller, self.starts = loop, controller, tuple(starts)
-        self.responses = responses
-        self.remainders = Remainders(loop, recipe.windows)
-        n, m, z = loop.states, loop.inputs, controller.size
+        self.loop, self.controller, self.starts = remainders.loop, controller, tuple(starts)
+        self.responses, self.remainders = responses, remainders
+        n, m, z = self.loop.states, self.loop.inputs, controller.size
         self._outputs = np.concatenate(
             [np.tile(np.arange(n), len(responses.nodes)), np.arange(n, n + m + z)]
         )  # which of e, delta, zeta a row is about
@@ -101,6 +103,7 @@ class Inequalities:
         """The same with other stages or other cuts; what is common is not computed again."""
         found = copy(self)
         found.starts = self.starts if starts is None else tuple(starts)
+        found._by_eta = None
         if cuts is not None:
             found._cut(replace(self.recipe, cuts=cuts))
         return found
@@ -109,7 +112,8 @@ class Inequalities:
         self.recipe = recipe
         outputs = self.loop.states + self.loop.inputs + self.controller.size
         cuts = np.array(recipe.cuts, dtype=np.intp).reshape(outputs, -1)
-        self._cuts = cuts[self._outputs]  # (rows, r)
+        self._cuts = cuts[self._outputs]  # (R, r)
+        self._by_eta: tuple[Array, Array, Array] | None = None
 
     @property
     def last(self) -> int:
@@ -138,21 +142,21 @@ class Inequalities:
 
     # -- the terms ---------------------------------------------------------------------------------------------------
 
-    def phases(self, boxes: Boxes) -> tuple[list[_Phase], Amplitudes]:
+    def phases(self, boxes: Boxes) -> tuple[list[_Phase], Sizes]:
         """The parts of time in which the same stage lasts and commands of the same stages act."""
         q = self.loop.whole
         starts = sorted({0, *self.starts, *(k + q + 1 for k in self.starts[1:])})
         ends = [*starts[1:], starts[-1] + 1]
         of = np.searchsorted(self.starts, np.arange(starts[-1] + 2), side="right") - 1
-        whole = boxes.W.max(axis=0)
+        sizes = self.remainders.sizes(boxes.W.max(axis=0))
         found = []
         for start, end in zip(starts, ends, strict=True):
             acting = boxes.U[of[max(0, start - q - 1)] : of[end - 1] + 1].max(axis=0)
             stage = int(of[start])
-            own = self.remainders.on(boxes.W[stage], acting, whole)
+            rho = self.remainders.rho(boxes.W[stage], acting, sizes.size)
             core = np.concatenate([boxes.W[stage], boxes.Z[stage], np.tile(acting, q + 1)])
-            found.append(_Phase(start, stage, acting, own.rho, core, own.size))
-        return found, own
+            found.append(_Phase(start, rho, core, sizes.size))
+        return found, sizes
 
     def _rounding(self, boxes: Boxes) -> Array:
         """r_y (n,), r_u (m,), r_z (z,): what the controller's own arithmetic is off by, of every stage (G9)."""
@@ -181,7 +185,7 @@ class Inequalities:
         most_core = np.max([phase.core for phase in phases], axis=0)
         now += total(own.missed_core, np.maximum(most_core, self._begins)) + total(own.missed_eta, sizes.size)
         constant = own.noise + own.wind + total(own.rounding, off)
-        b = now + constant[lag] + self._slow(sizes, lag, k) + self._first(k) + self._tail(phases, k)
+        b = now + constant[lag] + self._slow(sizes) + self._first(k) + self._tail(phases, k)
         starts = [*(phase.start for phase in phases[1:]), self.last + 2]
         slack = 8 * (own.lags + 8) * UNIT  # a difference of two sums from above
         for phase, end in zip(phases, starts, strict=True):
@@ -211,7 +215,7 @@ class Inequalities:
             [
                 (weighed(own.noise_now, loop.noise) + own.noise[lag]),
                 total(own.rho, held)[lag],
-                self._slow(sizes, lag, k),
+                self._slow(sizes)[k],
                 own.wind[lag],
                 self._first(np.arange(self.last + 1))[k],
             ],
@@ -235,20 +239,28 @@ class Inequalities:
         nothing = np.zeros(self.responses.dynamics.core_size - self.loop.states)
         return np.concatenate([self.loop.start.reach, nothing])
 
-    def _slow(self, sizes: Amplitudes, lag: _INDEX, k: _INDEX) -> Array:
+    def _slow(self, sizes: Sizes) -> Array:
         """eta by its rate up to the cut, and by its size from there on (D-cut), (K, R)."""
-        own = self.responses
-        found = np.zeros((len(k), len(self._outputs)))
-        rows = np.arange(found.shape[1])
-        for c, (size, rate, first) in enumerate(zip(sizes.size, sizes.rate, sizes.first, strict=True)):
-            cut = self._cuts[:, c]
-            upto = np.minimum(lag[:, None], cut)
-            found += rate * own.rate[upto, rows, c]
-            begins = (k[:, None] <= cut) & (k[:, None] <= own.lags)
-            found += np.where(begins, first, size) * np.abs(own.eta[upto, rows, c])
-            older = own.size[lag[:, None], rows, c]
-            found += size * (older - own.size[upto, rows, c] + 8 * (own.lags + 8) * UNIT * older)
-        return found
+        if self._by_eta is None:
+            self._by_eta = self._cut_apart()
+        rate, first, size = self._by_eta
+        return total(rate, sizes.rate) + total(first, sizes.first) + total(size, sizes.size)
+
+    def _cut_apart(self) -> tuple[Array, Array, Array]:
+        """What |eta'|, |eta(0)| and |eta| count in every row, (K, R, r) each."""
+        own, k = self.responses, np.arange(self.last + 1)[:, None, None]
+        lag = np.minimum(k, own.lags)
+        rows, column = np.arange(own.count)[None, :, None], np.arange(self._cuts.shape[1])[None, None]
+        upto = np.minimum(lag, self._cuts)
+        entry = np.abs(own.eta[upto, rows, column])
+        begins = (k <= self._cuts) & (k <= own.lags)  # the row still holds the entry that meets eta(0)
+        older, newer = own.size[lag, rows, column], own.size[upto, rows, column]
+        slack = 8 * (own.lags + 8) * UNIT  # a difference of two sums from above
+        return (
+            own.rate[upto, rows, column],
+            np.where(begins, entry, 0.0),
+            np.where(begins, 0.0, entry) + (older - newer + slack * older),
+        )
 
     def _first(self, k: _INDEX) -> Array:
         """sup |r_k xi_0| of the start, for k <= L; afterwards nothing."""
@@ -273,7 +285,7 @@ class Inequalities:
         found[late] = boxes[index]
         return found
 
-    def _within(self, phase: _Phase, sizes: Amplitudes) -> Array:
+    def _within(self, phase: _Phase, sizes: Sizes) -> Array:
         """What acts within the sample itself, up to every node, (nodes, n)."""
         return np.array(
             [
@@ -327,7 +339,7 @@ def check(
     starts = [own.start for own in stages]
     if inequalities is None:
         made = Responses(loop, controller, lags=recipe.lags, pieces=recipe.pieces, panels=recipe.panels)
-        inequalities = Inequalities(loop, controller, recipe, starts, made)
+        inequalities = Inequalities(controller, recipe, starts, made, Remainders(loop, recipe.windows))
     names = loop.model.states, loop.model.inputs
     above = Boxes.of(stages, names, above=True)
     below = Boxes.of(stages, names, above=False)
