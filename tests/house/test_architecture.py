@@ -18,7 +18,8 @@ ROOMS = [
     "release", "errors", "printable", "findings", "files", "kept", "leash", "executor", "libraries",
     "verdict", "letters", "progress", "expression", "records", "digits", "recheck", "spec", "enclosure",
     "claims", "model", "coordinates", "metric", "synthesis", "trajectory", "planner", "tube", "bounds",
-    "conditions", "kernel", "search", "lint", "kinds", "certificate", "stages", "words", "simulate",
+    "conditions", "kernel", "search", "lint", "kinds", "certificate", "sampled_loop",
+    "loop_design", "controller", "simulation", "stages", "words", "simulate",
     "pipeline", "checking", "sweep", "report", "library", "cli",
 ]  # fmt: skip
 MODULES = sorted(PACKAGE.rglob("*.py"))
