@@ -30,7 +30,7 @@ from tubecert.letters import ALONE
 from tubecert.metric.verify import Proofs
 from tubecert.model import domain_findings
 from tubecert.pipeline.certification import answer, result
-from tubecert.pipeline.checks import inspect, missing_parts, missing_sections, moving_drift
+from tubecert.pipeline.checks import inspect, missing_parts, missing_sections, unsearchable
 from tubecert.pipeline.counting import counted
 from tubecert.pipeline.deadline import Deadline
 from tubecert.progress import Progress
@@ -146,7 +146,7 @@ def synthesise(
     required(wanted.solver)
     spec = replace(overridden(spec, options), metric=None, synthesis=None)
     findings, time = time_of(spec)
-    findings += [*moving_drift(spec), *missing_sections(spec, wanted)]
+    findings += [*unsearchable(spec), *missing_sections(spec, wanted)]
     findings += domain_findings(spec, time, Effort(budget=options.budget)) if not findings else []
     if any(item.severity is Severity.ERROR for item in findings):
         raise SpecError(findings)

@@ -9,6 +9,7 @@ from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec, Synthesis
+from tubecert.spec.metric_file import of_no_metric
 from tubecert.spec.system import NO_SEARCH
 from tubecert.stages.time import time_of
 from tubecert.verdict import Verdict
@@ -44,7 +45,9 @@ def _rank_findings(spec: Spec, effort: Effort) -> list[Finding]:
 
 
 def missing_parts(spec: Spec) -> list[Finding]:
-    """What a certification needs and a specification may lack."""
+    """What a certification in continuous time needs and a specification may lack, or has and may not have."""
+    if refused := of_no_metric(spec):
+        return refused
     file = Path(spec.path)
     found = f"{file.stem}.metric.json"
     remedy = "give metric.dual_metric and metric.rate, or have one found: metric: {synthesise: {}}"
@@ -54,10 +57,10 @@ def missing_parts(spec: Spec) -> list[Finding]:
     return [*([_missing(spec, "metric", remedy)] if has_none else []), *missing_radii(spec)]
 
 
-def moving_drift(spec: Spec) -> list[Finding]:
-    """What no metric is found for: an f that depends on t."""
+def unsearchable(spec: Spec) -> list[Finding]:
+    """What no metric is found for: an f that depends on t, or a sampled loop, which has none."""
     if build(spec).time is None:
-        return []
+        return of_no_metric(spec)
     message = "f depends on t, and metrics are not found for that"
     return [Finding(code="TC112", message=message, location=spec.location("system.f"), help=NO_SEARCH)]
 

@@ -11,6 +11,7 @@ from fractions import Fraction
 from typing import Final
 
 from tubecert.errors import SpecError
+from tubecert.findings import Finding
 from tubecert.spec import codes
 from tubecert.spec.coefficients import is_of_coefficients, metric_text
 from tubecert.spec.document import MappingNode, Scalar, compose
@@ -44,7 +45,19 @@ def with_metric_text(spec: Spec, text: str, file: str) -> Spec:
     return _with(spec, Source.of(file, text))
 
 
+def of_no_metric(spec: Spec) -> list[Finding]:
+    """That a specification asks about a sampled loop, where a metric is asked for or given; empty if it does not."""
+    if spec.hardware is None:
+        return []
+    message = "hardware asks about the sampled loop, which is proven without a metric"
+    help = f"`tubecert certify {spec.path}` needs none; for a loop in continuous time leave hardware out"
+    place = spec.location("hardware")
+    return [Finding(code=codes.RANGE, message=message, location=place, help=help)]
+
+
 def _with(spec: Spec, source: Source) -> Spec:
+    if refused := of_no_metric(spec):
+        raise SpecError(refused)
     check_limits(source)
     node, findings = compose(source, language="JSON")
     reader = Reader(source, document="the metric file")
