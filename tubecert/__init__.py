@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tubecert.library.certifying import certify
     from tubecert.library.checks import Checked, check
     from tubecert.library.comparing import Comparison, compare
+    from tubecert.library.exporting import Exported, export
     from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
     from tubecert.library.pages import Report, report
     from tubecert.library.reading import read
@@ -34,6 +35,7 @@ __all__ = [
     "Certification",
     "Checked",
     "Comparison",
+    "Exported",
     "Gains",
     "Phase",
     "Rechecked",
@@ -54,6 +56,7 @@ __all__ = [
     "certify",
     "check",
     "compare",
+    "export",
     "load",
     "read",
     "recheck",
@@ -74,6 +77,8 @@ _HOMES = {
     "check": "library.checks",
     "Comparison": "library.comparing",
     "compare": "library.comparing",
+    "Exported": "library.exporting",
+    "export": "library.exporting",
     "Swept": "library.sweeping",
     "SynthesisedMetric": "library.metrics",
     "VerifiedMetric": "library.metrics",

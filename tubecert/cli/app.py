@@ -13,6 +13,7 @@ import typer
 from tubecert.cli import (
     comparing,
     everyday,
+    exporting,
     rechecking,
     simulating,
     sweeping,
@@ -225,6 +226,7 @@ comparing.register(app)
 verifying.register(app)
 simulating.register(app)
 rechecking.register(app)
+exporting.register(app)
 everyday.register(app)
 
 

@@ -120,8 +120,6 @@ _PLAIN: Final = (
 _GONE: Final[Mapping[str, str]] = {
     "design": "the narrowest tube for a machine is withdrawn until the sampled loop has a certificate of its own; "
     "tubecert sweep tries widths, e.g. --over tube.half_widths.x1=0.1:0.5:5",
-    "export": "controllers are withdrawn until the sampled loop has a certificate of its own; "
-    "tc.certify(...).gains has the gains of the continuous one",
 }
 """Commands that there once were."""
 
@@ -136,7 +134,6 @@ _OTHER_OPTIONS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("--eps",), "the radius beyond the initial offset is --epsilon"),
     **dict.fromkeys(("--out", "--json-out"), "the certificate's file is --output FILE, or -o FILE"),
     "--formulas": "the paper's formulas as printed are in benchmarks/published.py; certify has the corrected ones",
-    "--controller": "exported controllers are gone until the sampled loop has a certificate of its own",
     **dict.fromkeys(
         ("--control-rate", "--sample-time"), "the loop of certificate B acts in continuous time: leave it out"
     ),
