@@ -215,7 +215,7 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
 def test_the_choices_are_those_of_the_readers():
     from tubecert.letters import ADAPTIVE, ALL, NAMES, words_of
     from tubecert.spec.plan import KINDS
-    from tubecert.spec.settings import METRICS, RANGES, VERDICTS
+    from tubecert.spec.settings import METRICS, RANGES, VERDICTS, WIDTHS
     from tubecert.spec.simulation import CONTROLLERS
     from tubecert.spec.synthesis import OBJECTIVES, ROUTES, SOLVERS
 
@@ -223,7 +223,7 @@ def test_the_choices_are_those_of_the_readers():
     assert properties["trajectory"]["properties"]["kind"]["enum"] == list(KINDS)
     assert properties["expect"]["properties"]["verdict"]["enum"] == list(VERDICTS)
     assert properties["expect"]["properties"]["metric"]["enum"] == list(METRICS.values())
-    assert set(properties["expect"]["properties"]) == {"verdict", "metric", *RANGES}
+    assert set(properties["expect"]["properties"]) == {"verdict", "metric", WIDTHS, *RANGES}
     decides = properties["conditions"]["properties"]["decides"]["enum"]
     assert set(map(str, decides)) == {*words_of(), ALL}
     result = SCHEMAS["certificate"]["properties"]["result"]["properties"]

@@ -16,7 +16,7 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
 from tubecert.pipeline.verification import Verified
 from tubecert.spec import Spec
-from tubecert.spec.settings import METRICS
+from tubecert.spec.settings import METRICS, WIDTHS
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.claims import input_title, message, title
@@ -77,6 +77,7 @@ def _numbers(result: Result) -> Iterator[tuple[str, float]]:
         yield from _largest_rate(result.metric.largest_rate)
     if result.tube is not None:
         yield "rho", float(result.tube.rho)
+        yield from ((f"{WIDTHS}.{name}", width) for name, width in (result.tube.half_widths or {}).items())
     if result.clearance:
         yield "clearance", min(each.clearance.below for each in result.clearance)
     uses = [each.use(result.decided_by) for each in result.inputs]

@@ -27,7 +27,7 @@ def _family(path: str) -> Spec:
     from tubecert.spec import load, load_text
 
     if Path(path).suffix.lower() == ".json":
-        from tubecert.library.certification import read
+        from tubecert.library.reading import read
 
         effective = read(path).result.spec.effective
         spec = load_text(json.dumps(dict(effective.data)), path)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from tubecert import pipeline
 from tubecert.cli import telling
-from tubecert.cli.options import Output
+from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
 from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode
@@ -64,7 +64,7 @@ def run(given: Given, output: Output) -> ExitCode:
     task = Task(path=source.file, text=source.text, fixed=fixed, options=options, folder=folder)
     terminal = Terminal.stderr(color=output.color)
     with telling.shown(terminal, output) as report:
-        found = swept(task, axes, cluster, jobs or 1, report, parquet=given.parquet)
+        found = swept(task, axes, cluster, jobs or 1, report, parquet=given.parquet, named=flag)
     table = found.table
     data = printable_json(json.dumps(_rows(table), indent=1, ensure_ascii=False)) + "\n"
     present(

@@ -15,7 +15,9 @@ from tubecert.certificate.effective import Tree
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.asked import refuse
-from tubecert.library.certification import Certification, read
+from tubecert.library.certification import Certification
+from tubecert.library.reading import read
+from tubecert.library.sampled import SampledCertification
 from tubecert.library.specification import File
 from tubecert.printable import printable_json
 from tubecert.report import html, markdown
@@ -97,7 +99,9 @@ FORMATS: Final[Mapping[str, Callable[[Comparison], str]]] = {
 }
 
 
-def compare(*certificates: Certification | File, names: Sequence[str] | None = None) -> Comparison:
+def compare(
+    *certificates: Certification | SampledCertification | File, names: Sequence[str] | None = None
+) -> Comparison:
     """Put certificates side by side: values, or files of some. Nothing is examined; `recheck` does that.
 
     `names` are what they are called; without, a file is called by its name, a value by that of its specification.
@@ -107,9 +111,9 @@ def compare(*certificates: Certification | File, names: Sequence[str] | None = N
         refuse("certificates", str(len(certificates)), "two certificates or more are compared")
     if names is not None and len(names) != len(certificates):
         refuse("names", ", ".join(names), f"{len(names)} names for {len(certificates)} certificates")
-    read_ones = [each if isinstance(each, Certification) else read(each) for each in certificates]
+    read_ones = [read(each) if isinstance(each, (str, os.PathLike)) else each for each in certificates]
     own = [
-        found.name if isinstance(each, Certification) else os.fspath(each)
+        os.fspath(each) if isinstance(each, (str, os.PathLike)) else found.name
         for each, found in zip(certificates, read_ones, strict=True)
     ]
     called = own if names is None else names

@@ -62,9 +62,14 @@ class SampledCertification(Stated):
     @property
     def reasons(self) -> tuple[Reason, ...]:
         """What is lacking, in words: `claim`, `message` and `relax` (what would help)."""
-        from tubecert.report.sampled_loop import reasons
+        from tubecert.report.page import Reason
+        from tubecert.words.sampled_loop import remedy, why
 
-        return reasons(self.certificate)
+        notes = self.certificate.notes
+        return tuple(
+            Reason(verdict=self.verdict, claim=lack.kind, message=why(lack), relax=remedy(lack, notes))
+            for lack in self.result.lacks
+        )
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -76,26 +81,23 @@ class SampledCertification(Stated):
     @property
     def half_widths(self) -> Mapping[str, float]:
         """How far each state can be from the plan at any time, in its unit; empty if nothing is proven."""
-        from tubecert.report.sampled_loop import half_widths
-
-        return _rounded_up(half_widths(self.result))
+        return _rounded_up(self.result.half_widths)
 
     @property
     def start(self) -> Mapping[str, float]:
         """The same from the first sample on, until the tube gets narrower."""
-        return _rounded_up(self.result.tube[0].half_widths if self.result.tube else {})
+        return _rounded_up(self.result.tube[0].half_widths if self.certified else {})
 
     @property
     def long_run(self) -> Mapping[str, float]:
         """The same in the long run, when the start is forgotten: from sample `result.tube[-1].start` on."""
-        return _rounded_up(self.result.tube[-1].half_widths if self.result.tube else {})
+        return _rounded_up(self.result.tube[-1].half_widths if self.certified else {})
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """What each input stays within, plan and controller together: from below and from above, in its unit."""
-        return MappingProxyType(
-            {use.input: (-_up(-use.range[0]), _up(use.range[1])) for use in self.result.inputs}
-        )
+        proven = self.result.inputs if self.certified else ()
+        return MappingProxyType({use.input: (-_up(-use.range[0]), _up(use.range[1])) for use in proven})
 
     @property
     def shares(self) -> Mapping[str, Mapping[str, float]]:
@@ -107,6 +109,8 @@ class SampledCertification(Stated):
         """The tube over time; None for a family of plans, and if nothing is proven."""
         from tubecert.report.figures_sampled import band
 
+        if not self.certified:
+            return None
         t, x, widths = band(self.certificate)
         return (
             Tube(t=array(t), lower=array(x - widths), upper=array(x + widths), plan=array(x))

@@ -17,9 +17,9 @@ from tubecert.errors import SpecError
 from tubecert.executor import Executor, chosen
 from tubecert.files import replace
 from tubecert.findings import Finding
-from tubecert.library.asked import effort_numbers, jobs_of
-from tubecert.library.certification import Certification, read
+from tubecert.library.asked import Named, effort_numbers, jobs_of, require_nothing_of_a_metric
 from tubecert.library.plain import Number, number_text, number_texts
+from tubecert.library.reading import read
 from tubecert.library.specification import NAME, File, Specifiable, spec_of
 from tubecert.library.workers import cluster_at
 from tubecert.progress import Progress
@@ -27,12 +27,15 @@ from tubecert.report import sweep as told
 from tubecert.report.progress import timed
 from tubecert.report.sweep import Row, SweepTable
 from tubecert.spec import Setting
+from tubecert.stages.options import Options
 from tubecert.sweep.grid import Axis
 from tubecert.sweep.point import Task
 from tubecert.sweep.run import Sweep
 
 if TYPE_CHECKING:
     from tubecert.enclosure.interval import Array
+    from tubecert.library.certification import Certification
+    from tubecert.library.sampled import SampledCertification
     from tubecert.report.quantities import Value
 
 REMEDY: Final = "the folder of a sweep must stay there while it runs"
@@ -71,7 +74,7 @@ class SweptPoint:
         """Where the certificate is, or why there is none."""
         return self.folder / self.row.file
 
-    def certification(self) -> Certification:
+    def certification(self) -> Certification | SampledCertification:
         """The certificate; raises `TargetError` where there is none."""
         return read(self.file)
 
@@ -181,12 +184,19 @@ def swept(
     progress: Progress | None,
     *,
     parquet: bool,
+    named: Named = str,
 ) -> Swept:
     """Certify what is missing, then write the table of all. Raises as `sweep` does."""
     if parquet and not told.can_write_parquet():
         message, help = "a table in Parquet needs pyarrow", "pip install pyarrow, or read table.csv"
         raise SpecError([Finding(code="TC122", message=message, help=help)])
     whole = Sweep.of(task, axes)
+    if whole.first().hardware is not None:
+        usual, asked = Options(), task.options
+        given = {name: getattr(asked, name) for name in ("metric", "conditions", "gap", "budget")}
+        require_nothing_of_a_metric(
+            {name: own for name, own in given.items() if own != getattr(usual, name)}, named
+        )
     if cluster is not None:
         _require_paths(whole)
     whole.run(cluster or chosen(jobs, len(whole.points)), progress)

@@ -16,19 +16,18 @@ from pathlib import PurePath
 from typing import Final
 
 from tubecert.certificate.effective import Tree
-from tubecert.certificate.result import Certificate, Result
 from tubecert.digits import UNKNOWN, down, exact, percent, up
 from tubecert.records import exact_json
 from tubecert.report.claimed import NOT_RECHECKED
 from tubecert.report.figures_comparison import comparison_figures
 from tubecert.report.page import Block, Cell, Figures, Page, Section, Table
-from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
+from tubecert.report.quantities import AnyCertificate, AnyResult, Quantity, Value, failed, merged, quantities
 from tubecert.words.conditions import SECTIONS
 
 MISSING: Final = "not there"
 _MOST = 60  # differences shown on a page
 _LONG = 60  # characters of one
-_DOWN = ("clearance", "limit")  # what is bounded from below
+_DOWN = ("clearance", "limit", "least")  # what is bounded from below
 _SPECIFICATION = "specification"
 
 
@@ -37,7 +36,7 @@ class Compared:
     """One of the certificates, with the name that it has beside the others."""
 
     name: str
-    certificate: Certificate
+    certificate: AnyCertificate
     found: Mapping[str, Quantity]
 
     def value(self, key: str) -> Value:
@@ -46,7 +45,7 @@ class Compared:
         return None if own is None else own.value
 
     @property
-    def result(self) -> Result:
+    def result(self) -> AnyResult:
         """What was proven."""
         return self.certificate.result
 
@@ -60,7 +59,7 @@ class Comparison:
     differences: Mapping[str, tuple[Tree, ...]]
 
     @classmethod
-    def of(cls, certificates: Sequence[tuple[str, Certificate]]) -> Comparison:
+    def of(cls, certificates: Sequence[tuple[str, AnyCertificate]]) -> Comparison:
         """The comparison of certificates in files of these names."""
         sides = tuple(
             Compared(name=name, certificate=told, found={each.key: each for each in quantities(told.result)})
@@ -225,7 +224,7 @@ def _names(paths: Sequence[str]) -> list[str]:
     return [f"{name} ({i})" if names.count(name) > 1 else name for i, name in enumerate(names, 1)]
 
 
-def _differences(results: Sequence[Result]) -> dict[str, tuple[Tree, ...]]:
+def _differences(results: Sequence[AnyResult]) -> dict[str, tuple[Tree, ...]]:
     """The keys, by path, whose values are not the same in all; None where a specification has no such key."""
     return dict(_differing_in([result.spec.effective.data for result in results], ""))
 

@@ -18,6 +18,7 @@ from tubecert.report.figures_axes import WIDTH, Point, blank, path, text
 from tubecert.report.figures_scene import Drawing, Outline, Plane, draw_obstacle, scene
 from tubecert.report.page import Figure
 from tubecert.sampled_loop.record import Certificate, Result, Shares
+from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import SHARES, percents
 
 _FOR_EVER: Final = 1.0  # s that are drawn of a plan without an end, beyond the start of the last stage
@@ -59,15 +60,14 @@ def band(certificate: Certificate) -> Band:
 
 def figures(certificate: Certificate) -> Iterator[Figure]:
     """All of them, as far as there is something to draw."""
-    t, x, widths = band(certificate)
+    result, (t, x, widths) = certificate.result, band(certificate)
     if t.size:
-        yield from (
-            each.figure("tube") for each in (*_states(certificate, t, x, widths), *_inputs(certificate, t))
-        )
-        yield from _planes(certificate.result, x, widths)
-    filled = {**certificate.notes.start, **certificate.notes.long_run, **certificate.notes.deviations}
-    if filled:
-        yield _bars(filled)
+        style = "tube" if result.verdict is Verdict.CERTIFIED else "unproven"
+        drawings = (*_states(certificate, t, x, widths), *_inputs(certificate, t))
+        yield from (each.figure(style) for each in drawings)
+        yield from _planes(result, x, widths)
+    if certificate.notes.filled:
+        yield _bars(certificate.notes.filled)
 
 
 def _states(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Drawing]:
@@ -80,7 +80,7 @@ def _states(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iter
             curve=_points(t, x[:, i]),
             band=(_points(t, x[:, i] - widths[:, i]), _points(t, x[:, i] + widths[:, i])),
             limits=_ends(effective.part("safe_set")[name]),
-            words=("safe set", "proven band", "plan"),
+            words=("safe set", "tube", "plan"),
         )
 
 
@@ -95,7 +95,7 @@ def _inputs(certificate: Certificate, t: Array) -> Iterator[Drawing]:
             curve=_points(t, np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])),
             band=(low, high),
             limits=None if use.limits is None else _ends(use.limits),
-            words=("limits", "proven range in the loop", "plan"),
+            words=("limits", "range in the loop", "plan"),
         )
 
 
@@ -115,7 +115,7 @@ def _planes(result: Result, x: Array, widths: Array) -> Iterator[Figure]:
             tube=Outline(turn=((2 * a, 0.0), (0.0, 2 * b)), sides=(a, b)),
             safe=((left, low), (right, high)),
         )
-        chart, legend = scene(f"plane-{i}-{j}", plane, [])
+        chart, legend = scene(f"plane-{i}-{j}", plane, [], result.verdict is Verdict.CERTIFIED)
         for obstacle in effective.obstacles:
             if set(obstacle.states) == set(names):
                 draw_obstacle(chart, obstacle, names)

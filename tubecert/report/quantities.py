@@ -10,15 +10,20 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from math import isfinite
+from typing import TypeAlias
 
-from tubecert.certificate.result import Result
+from tubecert.certificate.result import Certificate, Result
 from tubecert.claims.family import Claim
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.kinds.table import KINDS
 from tubecert.report.outline import widths
+from tubecert.sampled_loop.record import Certificate as SampledCertificate
+from tubecert.sampled_loop.record import Result as SampledResult
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import ROLES, SECTIONS, condition_name
 
+AnyCertificate: TypeAlias = Certificate | SampledCertificate
+AnyResult: TypeAlias = Result | SampledResult
 Value = Fraction | float | str | None
 _SYMBOLS = {
     "bandwidth": "ω (rad/s)",
@@ -72,8 +77,11 @@ class Quantity:
         return ", ".join(part for part in parts if part)
 
 
-def quantities(result: Result) -> Iterator[Quantity]:
-    """Every quantity, the tube's first, then kind after kind."""
+def quantities(result: AnyResult) -> Iterator[Quantity]:
+    """Every quantity, the tube's first, then kind after kind; of a sampled loop the tube's and the inputs'."""
+    if isinstance(result, SampledResult):
+        yield from _of_sampled_loop(result)
+        return
     yield from _of_tube(result)
     for kind in KINDS:
         section = result.sections.get(kind.key)
@@ -81,8 +89,10 @@ def quantities(result: Result) -> Iterator[Quantity]:
             yield from _of_section(kind.key, section, asked=result.asked)
 
 
-def failed(result: Result) -> str:
+def failed(result: AnyResult) -> str:
     """What is not proven, by ids: claims of the verdict, each with what tells which one it is."""
+    if isinstance(result, SampledResult):
+        return " ".join(f"{lack.kind}:{lack.where}".removesuffix(":") for lack in result.lacks)
     found = [_id(reason.claim) for reason in result.reasons if reason.verdict is not Verdict.CERTIFIED]
     return " ".join(dict.fromkeys(found))
 
@@ -98,6 +108,15 @@ def _of_tube(result: Result) -> Iterator[Quantity]:
             yield Quantity(name=f"half_width.{state}", value=width)
     for index, found in enumerate(result.clearance):
         yield Quantity(name=f"clearance.{index}", value=found.clearance.below)
+
+
+def _of_sampled_loop(result: SampledResult) -> Iterator[Quantity]:
+    for state, width in result.half_widths.items():
+        yield Quantity(name=f"half_width.{state}", value=width)
+        yield Quantity(name=f"half_width_in_the_long_run.{state}", value=result.tube[-1].half_widths[state])
+    for use in result.inputs if result.half_widths else ():
+        yield Quantity(name=f"least.{use.input}", value=use.range[0])
+        yield Quantity(name=f"greatest.{use.input}", value=use.range[1])
 
 
 def _of_section(key: str, section: SectionData, *, asked: bool) -> Iterator[Quantity]:

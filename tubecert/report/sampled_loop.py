@@ -12,10 +12,10 @@ from typing import Final
 from tubecert.digits import down, exact, short, up
 from tubecert.report.claimed import NOT_RECHECKED, started
 from tubecert.report.figures_sampled import figures, period
-from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Reason, Section, Table, Tile
-from tubecert.sampled_loop.record import Certificate, InputUse, Notes, Result, Shares
+from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Section, Table, Tile
+from tubecert.sampled_loop.record import Certificate, Notes, Result
 from tubecert.verdict import Verdict
-from tubecert.words.sampled_loop import assumed, extent, family, filling, loop, plan, promise, remedy, why
+from tubecert.words.sampled_loop import assumed, extent, family, filling, loop, plan, promise, remedy
 
 _MOST, _ROWS = 6, 4  # states of the first screen; where there are more than four, they stand side by side
 _TILES: Final = 4
@@ -40,8 +40,7 @@ def page_of(certificate: Certificate) -> Page:
         meaning=f"{_meaning(result)} {NOT_RECHECKED}",
         tiles=tuple(
             Tile(symbol=name, value=f"±{up(width)}", unit=units.get(name, ""), words="half-width")
-            for name, width in [*half_widths(result).items()][:_TILES]
-            if result.verdict is Verdict.CERTIFIED
+            for name, width in [*result.half_widths.items()][:_TILES]
         ),
         sections=tuple(
             Section(key=key, title=title, blocks=tuple(blocks))
@@ -49,20 +48,6 @@ def page_of(certificate: Certificate) -> Page:
             if blocks
         ),
     )
-
-
-def half_widths(result: Result) -> dict[str, Fraction]:
-    """What is proven of every state at all times: the widest of all stages."""
-    names = result.spec.effective.system.states if result.tube else ()
-    return {name: max(stage.half_widths[name] for stage in result.tube) for name in names}
-
-
-def used(use: InputUse) -> Fraction | None:
-    """How much of the room between the middle of its limits and their ends an input may use; None without limits."""
-    if use.limits is None:
-        return None
-    middle, half = (use.limits[0] + use.limits[1]) / 2, (use.limits[1] - use.limits[0]) / 2
-    return max(use.range[1] - middle, middle - use.range[0]) / half
 
 
 def _meaning(result: Result) -> str:
@@ -107,9 +92,10 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     """Half-widths at the start, in the long run, as wished; `notes` say what fills them, inputs as well."""
     system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
     stages = result.tube if notes or len(result.tube) < 2 else (result.tube[0], result.tube[-1])
-    filled = _all_shares(notes) if notes else {}
+    filled = notes.filled if notes else {}
     when = (f"t >= {short(stage.start * period(result), 4)} s" for stage in stages)
-    grid = [["half-widths", *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
+    title = "half-widths" if result.verdict is Verdict.CERTIFIED else "not proven"
+    grid = [[title, *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
     for name in (*names, *(system.inputs if notes else ())):
         widths = [up(stage.half_widths.get(name, stage.deviations.get(name))) for stage in stages]
         row = [f"{name} ({system.units[name]})" if system.units.get(name) else name, *widths]
@@ -129,7 +115,7 @@ def _inputs(result: Result) -> Iterator[tuple[str, str]]:
     units = result.spec.effective.system.units
     for use in result.inputs:
         told = f"{down(use.range[0])} to {up(use.range[1])} {units.get(use.input, '')}".rstrip()
-        if use.limits is not None and (share := used(use)) is not None:
+        if use.limits is not None and (share := use.share) is not None:
             told += (
                 f" of {exact(use.limits[0])} to {exact(use.limits[1])}: {up(100 * share, 3)} % of the room"
             )
@@ -151,7 +137,7 @@ def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
 
 
 def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
-    missed = [str(each.index) for each in result.clearance if each.verdict is not Verdict.CERTIFIED]
+    missed = [str(each.index + 1) for each in result.clearance if each.verdict is not Verdict.CERTIFIED]
     if missed:
         yield "obstacles", f"not proven to keep away from number {', '.join(missed)}"
     elif result.clearance:
@@ -159,14 +145,12 @@ def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
 
 
 def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
-    """What fills that which lacks, and what would help; of a certified tube also which wish it misses."""
+    """What fills that which lacks, and what would help."""
     for lack in result.lacks:
-        shares = _all_shares(notes).get(lack.where)
-        if result.verdict is Verdict.CERTIFIED:
-            yield "missed", why(lack)
+        shares = notes.filled.get(lack.where)
         if shares is not None:
             yield f"fills {lack.where}", filling(shares)
-        yield "help", remedy(lack, shares)
+        yield "help", remedy(lack, notes)
 
 
 def _origin(certificate: Certificate) -> Facts:
@@ -178,22 +162,3 @@ def _origin(certificate: Certificate) -> Facts:
         )
     rows += [(name, str(told)) for name, told in certificate.run.items() if not isinstance(told, dict)]
     return _facts(rows)
-
-
-def reasons(certificate: Certificate) -> tuple[Reason, ...]:
-    """What is lacking, each with what would help."""
-    shares = _all_shares(certificate.notes)
-    return tuple(
-        Reason(
-            verdict=Verdict.UNDECIDED,
-            claim=lack.kind.replace("_", " "),
-            message=why(lack),
-            relax=remedy(lack, shares.get(lack.where)),
-        )
-        for lack in certificate.result.lacks
-    )
-
-
-def _all_shares(notes: Notes) -> dict[str, Shares]:
-    """By state, in the long run where it is known, and by input."""
-    return {**notes.start, **notes.long_run, **notes.deviations}

@@ -11,17 +11,19 @@ from typing import TYPE_CHECKING, Final
 
 from rich.text import Text
 
-from tubecert.certificate.result import Certificate
 from tubecert.digits import exact, up
 from tubecert.report.console import STYLES
 from tubecert.report.gains import deciding
 from tubecert.report.layout import plain_table
 from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
+from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sweep.grid import Axis
-from tubecert.sweep.point import Failed, Point
+from tubecert.sweep.point import Failed, Kept, Point
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from tubecert.certificate.result import Certificate
 
 ERROR: Final = "error"
 _SHOWN: Final = 40  # rows on a terminal
@@ -41,7 +43,7 @@ class Row:
     broken: bool = False  # by a defect of tubecert
 
     @classmethod
-    def of(cls, point: Point, outcome: Certificate | Failed) -> Row:
+    def of(cls, point: Point, outcome: Kept) -> Row:
         """The row of what is kept."""
         if isinstance(outcome, Failed):
             codes = " ".join(dict.fromkeys(item.code or "internal" for item in outcome.problems))
@@ -54,7 +56,7 @@ class Row:
             failed=failed(result),
             why="",
             found={each.key: each for each in quantities(result)},
-            gains="; ".join(row.text() for row in deciding(result)),
+            gains=_found(outcome),
         )
 
     @property
@@ -78,9 +80,7 @@ class SweepTable:
     columns: tuple[Quantity, ...]
 
     @classmethod
-    def of(
-        cls, name: str, axes: Sequence[Axis], outcomes: Iterable[tuple[Point, Certificate | Failed]]
-    ) -> SweepTable:
+    def of(cls, name: str, axes: Sequence[Axis], outcomes: Iterable[tuple[Point, Kept]]) -> SweepTable:
         """The table of what is kept."""
         rows = tuple(Row.of(point, outcome) for point, outcome in outcomes)
         columns = tuple(merged(row.found.values() for row in rows))
@@ -130,6 +130,13 @@ class SweepTable:
         return target.getvalue()
 
 
+def _found(outcome: Certificate | SampledCertificate) -> str:
+    """The gains that decide; of a sampled loop, whose controller has none, the half-widths."""
+    if isinstance(outcome, SampledCertificate):
+        return ", ".join(f"{name} {up(width)}" for name, width in outcome.result.half_widths.items())
+    return "; ".join(row.text() for row in deciding(outcome.result))
+
+
 def can_write_parquet() -> bool:
     """Whether pyarrow is installed, which is no part of tubecert."""
     return importlib.util.find_spec("pyarrow") is not None
@@ -160,7 +167,7 @@ def summary(table: SweepTable) -> Text:
 def report(table: SweepTable, files: Sequence[str]) -> list[RenderableType]:
     """The summary, the first rows, and what was written."""
     keys = [f">{axis.path}" for axis in table.axes]
-    rows = plain_table(*keys, "verdict", ">rho", "gains", wrapped=len(keys) + 2)
+    rows = plain_table(*keys, "verdict", ">rho", "gains, or half-widths", wrapped=len(keys) + 2)
     for row in table.rows[:_SHOWN]:
         own = [each.text for each in row.point.settings]
         rho = row.value("rho")

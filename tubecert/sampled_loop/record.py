@@ -150,6 +150,14 @@ class InputUse:
     range: tuple[Fraction, Fraction]
     limits: tuple[Fraction, Fraction] | None = None
 
+    @property
+    def share(self) -> Fraction | None:
+        """How much is used of the room between the middle of the limits and their ends; None without limits."""
+        if self.limits is None:
+            return None
+        middle, half = (self.limits[0] + self.limits[1]) / 2, (self.limits[1] - self.limits[0]) / 2
+        return max(self.range[1] - middle, middle - self.range[0]) / half
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cleared:
@@ -198,6 +206,13 @@ class Result:
     recipe: Recipe | None = None
     lacks: tuple[Lack, ...] = ()
 
+    @property
+    def half_widths(self) -> dict[str, Fraction]:
+        """What is proven of every state at all times, the widest of all stages; empty if nothing is certified."""
+        proven = self.tube if self.verdict is Verdict.CERTIFIED else ()
+        names = proven[0].half_widths if proven else ()
+        return {name: max(stage.half_widths[name] for stage in proven) for name in names}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shares:
@@ -226,6 +241,11 @@ class Notes:
     samples_x: tuple[tuple[float, ...], ...] = ()
     samples_u: tuple[tuple[float, ...], ...] = ()
     evaluations: int = 0
+
+    @property
+    def filled(self) -> dict[str, Shares]:
+        """Shares by state, in the long run where it is known, and by input."""
+        return {**self.start, **self.long_run, **self.deviations}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

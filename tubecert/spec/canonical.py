@@ -7,7 +7,7 @@ it loads to the same system.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -45,7 +45,7 @@ def canonical(spec: Spec) -> dict[str, Any]:
     elif spec.synthesis is not None:
         data["metric"] = {"synthesise": synthesis_data(spec.synthesis)}
     if spec.expect is not None:
-        data["expect"] = {name: _numbers(limits) for name, limits in spec.expect.ranges}
+        data["expect"] = _nested({name: _numbers(limits) for name, limits in spec.expect.ranges})
         if spec.expect.verdict is not None:
             data["expect"]["verdict"] = spec.expect.verdict
         if spec.expect.metric is not None:
@@ -259,6 +259,15 @@ def _simulation(wanted: Simulation) -> dict[str, Any]:
         **_given(duration=wanted.duration),
     }
     return {key: value for key, value in data.items() if value}
+
+
+def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys `a.b` as a mapping within `a`."""
+    data: dict[str, Any] = {}
+    for path, value in flat.items():
+        section, _, key = path.partition(".")
+        data |= {section: {**data.get(section, {}), key: value} if key else value}
+    return data
 
 
 def _texts(terms: Iterable[Term]) -> list[str]:

@@ -20,6 +20,8 @@ VERDICTS: Final = ("certified", "refuted", "undecided")
 METRICS: Final = {Verdict.CERTIFIED: "holds", Verdict.REFUTED: "refuted", Verdict.UNDECIDED: "undecided"}
 RANGES: Final = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "largest_rate")
 
+WIDTHS: Final = "half_widths"  # ranges by state and output
+
 _KEYS: Final = tuple(item.name for item in fields(Tube))  # of `tube`
 _SLUG = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
@@ -165,7 +167,7 @@ def read_decides(field: Field | None) -> str | None:
 
 def read_expectation(field: Field | None, names: Names, *, alone: bool) -> Expectation | None:
     """Locked results: verdicts, and [least, most] of numbers of the certificate; `alone`: of a metric alone."""
-    entries = field.mapping(optional=("verdict", "metric", *RANGES)) if field else None
+    entries = field.mapping(optional=("verdict", "metric", WIDTHS, *RANGES)) if field else None
     if entries is None:
         return None
     for key in entries.keys() - {"metric", "largest_rate"} if alone else ():
@@ -176,11 +178,14 @@ def read_expectation(field: Field | None, names: Names, *, alone: bool) -> Expec
         )
     verdict = entries["verdict"].word(VERDICTS) if "verdict" in entries else None
     metric = entries["metric"].word(tuple(METRICS.values())) if "metric" in entries else None
+    wide = entries[WIDTHS].mapping(optional=names.lengths) if WIDTHS in entries else None
+    told: dict[str, Field] = {key: entries[key] for key in RANGES if key in entries}
+    told |= {f"{WIDTHS}.{name}": own for name, own in (wide or {}).items()}
     ranges = []
-    for key in RANGES:
-        limits = entries[key].numbers(2, names.values) if key in entries else None
+    for key, own in told.items():
+        limits = own.numbers(2, names.values)
         if limits and limits[0] > limits[1]:
-            entries[key].fail(codes.RANGE, f"{entries[key].path}: the range is empty", "write [least, most]")
+            own.fail(codes.RANGE, f"{own.path}: the range is empty", "write [least, most]")
         elif limits:
             ranges.append((key, (limits[0], limits[1])))
     return Expectation(verdict=verdict, metric=metric, ranges=tuple(ranges))

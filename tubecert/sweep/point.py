@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 from tubecert import certificate, pipeline
 from tubecert.certificate.result import Certificate
@@ -17,6 +17,9 @@ from tubecert.files import Kind, read
 from tubecert.libraries import versions
 from tubecert.printable import printable_json, visible
 from tubecert.records import FormError, from_json, to_json
+from tubecert.sampled_loop import file as sampled
+from tubecert.sampled_loop.record import FORMAT as SAMPLED
+from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.spec import Setting, Spec
 from tubecert.spec.load import load_source
 from tubecert.spec.metric_file import with_metric
@@ -40,7 +43,8 @@ class Task:
     def load(self, settings: tuple[Setting, ...]) -> Spec:
         """The specification of a point; raises `TubecertError`."""
         spec = load_source(Source.of(self.path, self.text), (*self.fixed, *settings))
-        return spec if self.options.metric is None else with_metric(spec, str(self.options.metric))
+        bare = self.options.metric is None or spec.hardware is not None
+        return spec if bare else with_metric(spec, str(self.options.metric))
 
     def command(self, settings: tuple[Setting, ...]) -> str:
         """The command that makes the certificate of a point."""
@@ -87,6 +91,9 @@ class Failed:
         return self.exit_code == ExitCode.INTERNAL
 
 
+Kept: TypeAlias = Certificate | SampledCertificate | Failed
+
+
 @lru_cache(maxsize=1)
 def memory_of(task: Task) -> pipeline.Memory:
     """What this process has proven for points of a sweep."""
@@ -97,7 +104,7 @@ def memory_of(task: Task) -> pipeline.Memory:
 def certify_point(task: Task, point: Point) -> None:
     """Certify a point and keep what comes out. Raises `TargetError` if it cannot be written."""
     try:
-        result = pipeline.certify(task.load(point.settings), task.options, memory=memory_of(task))
+        text = _certificate(task, point)
     except TubecertError as error:
         _keep_failed(
             task,
@@ -112,9 +119,20 @@ def certify_point(task: Task, point: Point) -> None:
         words = f"internal error: {type(error).__name__}: {visible(' '.join(str(error).split())[:200])}"
         _keep_failed(task, point, ExitCode.INTERNAL, [Problem(code="", message=words)])
         return
-    run = {"command": task.command(point.settings), "versions": versions()}
-    _write(certificate_file(task.folder, point), certificate.dump(certificate.seal(result.to_json(), run)))
+    _write(certificate_file(task.folder, point), text)
     error_file(task.folder, point).unlink(missing_ok=True)
+
+
+def _certificate(task: Task, point: Point) -> str:
+    """The certificate of a point, with no times: the same whenever it is made. Raises `TubecertError`."""
+    spec = task.load(point.settings)
+    run = {"command": task.command(point.settings), "versions": versions()}
+    if spec.hardware is None:
+        result = pipeline.certify(spec, task.options, memory=memory_of(task))
+        return certificate.dump(certificate.seal(result.to_json(), run))
+    from tubecert.loop_design.certification import certify
+
+    return sampled.certificate_text(replace(certify(spec, settings=dict(spec.settings)), run=run))
 
 
 def certificate_file(folder: Path, point: Point) -> Path:
@@ -127,19 +145,26 @@ def error_file(folder: Path, point: Point) -> Path:
     return folder / "points" / f"{point.name}.error.json"
 
 
-def outcome(task: Task, point: Point) -> Certificate | Failed | None:
+def outcome(task: Task, point: Point) -> Kept | None:
     """What is kept of a point, None if there is nothing (or something that tubecert did not write for this point)."""
     wanted = {each.path: each.text for each in (*task.fixed, *point.settings)}
-    found: Certificate | Failed
+    found: Kept
     try:
         if error_file(task.folder, point).exists():
             data = json.loads(read(str(error_file(task.folder, point)), _ERROR))
             found = from_json(Failed, data, "error")
             return found if (found.format, found.settings) == (ERROR_FORMAT, wanted) else None
-        found = Certificate.from_json(certificate.load(str(certificate_file(task.folder, point))))
+        path = str(certificate_file(task.folder, point))
+        sealed = certificate.load(path, (certificate.FORMAT, SAMPLED))
+        if sealed["format"] == SAMPLED:
+            found = sampled.of_json(sealed, path)
+            settings = found.result.spec.settings
+        else:
+            found = Certificate.from_json(sealed)
+            settings = found.result.overrides.settings
     except (TargetError, FormError, ValueError):
         return None
-    return found if found.result.overrides.settings == wanted else None
+    return found if settings == wanted else None
 
 
 def _keep_failed(task: Task, point: Point, code: ExitCode, problems: list[Problem]) -> None:

@@ -7,14 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from tubecert.certificate.result import Certificate
 from tubecert.errors import TubecertError
 from tubecert.executor import Executor
 from tubecert.progress import Phase, Progress, Step
 from tubecert.spec import Spec
 from tubecert.sweep.folder import identity, prepare, tidy
 from tubecert.sweep.grid import Axis, points
-from tubecert.sweep.point import Failed, Point, Task, certify_point, outcome
+from tubecert.sweep.point import Failed, Kept, Point, Task, certify_point, outcome
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +54,7 @@ class Sweep:
         executor.map(partial(certify_point, self.task), missing, ready)
         tidy(self.task.folder)
 
-    def outcomes(self) -> Iterator[tuple[Point, Certificate | Failed]]:
+    def outcomes(self) -> Iterator[tuple[Point, Kept]]:
         """What is kept of each point, in the order of the points."""
         for point in self.points:
             found = outcome(self.task, point)
@@ -71,6 +70,6 @@ class Sweep:
         return self.task.load(self.points[0].settings)
 
 
-def _done(found: Certificate | Failed | None) -> bool:
+def _done(found: Kept | None) -> bool:
     """Whether a point need not be certified again: a defect may have been mended meanwhile."""
-    return isinstance(found, Certificate) or (found is not None and not found.broken)
+    return found is not None and not (isinstance(found, Failed) and found.broken)

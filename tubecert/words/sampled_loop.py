@@ -12,7 +12,7 @@ from typing import Final
 
 from tubecert.certificate.effective import Effective, Tree
 from tubecert.digits import end, short, up
-from tubecert.sampled_loop.record import Lack, Missing, Result, Shares
+from tubecert.sampled_loop.record import Lack, Missing, Notes, Result, Shares
 from tubecert.verdict import Verdict
 
 SHARES: Final[Mapping[str, str]] = {
@@ -81,8 +81,9 @@ def why(lack: Lack) -> str:
     return _WHY[lack.kind].format(where=lack.where, mode=mode, **numbers)
 
 
-def remedy(lack: Lack, filled: Shares | None) -> str:
-    """What would help; `filled` is what fills the quantity that lacks."""
+def remedy(lack: Lack, notes: Notes) -> str:
+    """What would help, by what fills the quantity that lacks."""
+    filled = notes.filled.get(lack.where)
     most = "" if filled is None else max(SHARES, key=lambda name: float(getattr(filled, name)))
     return _HELP[lack.kind].format(largest=SHARES.get(most, "noise, wind, h or delay"))
 
