@@ -28,7 +28,8 @@ _STEPS: Final = 60
 _LARGE: Final = 1e6
 _STEADY: Final = 0.9  # a long run that is not narrower than this of the tube is no stage of its own
 _STAGES: Final = (32, 8, 3, 1)
-_DIGITS: Final = 5
+_WIDER: Final = 1 + 1e-3
+_DIGITS: Final = 7
 
 Report = Callable[[int, Array], None]
 
@@ -147,18 +148,19 @@ def _fixed_point(inequalities: Inequalities, boxes: Boxes, report: Report | None
 
 
 def _stages(loop: Loop, boxes: Boxes, starts: Sequence[int]) -> tuple[Stage, ...]:
-    """A thousandth wider, as decimals."""
+    """A thousandth wider, as decimals; what is later feeds on what is before, and has to be wider than that."""
 
-    def rounded(values: Array) -> list[Fraction]:
-        return [Fraction(up(float(value) * (1 + 1e-3) + 1e-30, _DIGITS)) for value in values]
+    def rounded(values: Array, stage: int) -> list[Fraction]:
+        wider = _WIDER * (1 + 1e-5) ** stage
+        return [Fraction(up(float(value) * wider + 1e-30, _DIGITS)) for value in values]
 
     model = loop.model
     return tuple(
         Stage(
             start=start,
-            half_widths=dict(zip(model.states, rounded(W), strict=True)),
-            deviations=dict(zip(model.inputs, rounded(U), strict=True)),
-            memory=tuple(rounded(Z)),
+            half_widths=dict(zip(model.states, rounded(boxes.W[g], g), strict=True)),
+            deviations=dict(zip(model.inputs, rounded(boxes.U[g], g), strict=True)),
+            memory=tuple(rounded(boxes.Z[g], g)),
         )
-        for start, W, U, Z in zip(starts, boxes.W, boxes.U, boxes.Z, strict=True)
+        for g, start in enumerate(starts)
     )

@@ -65,7 +65,8 @@ def _of_family(loop: Loop, count: int) -> Cells:
     edges = {i: np.linspace(lo[i], hi[i], parts + 1) for i in split}
     for i, each in edges.items():
         each[0], each[-1] = lo[i], hi[i]
-    picks = np.array(list(product(range(parts), repeat=len(split))), dtype=np.intp).reshape(-1, len(split))
+    choices = list(product(range(parts), repeat=len(split)))
+    picks = np.array(choices, dtype=np.intp).reshape(len(choices), len(split))
     low, high = np.tile(lo, (len(picks), 1)), np.tile(hi, (len(picks), 1))
     for place, i in enumerate(split):
         low[:, i], high[:, i] = edges[i][picks[:, place]], edges[i][picks[:, place] + 1]

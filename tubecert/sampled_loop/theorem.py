@@ -133,6 +133,7 @@ class Inequalities:
         ]
         within = np.max(between, axis=0) * (1 + 4 * UNIT)
         rest = b[:, n * nodes :]
+        rest[0, m:] = 0.0  # (c) is for k >= 1: zeta is 0 at boot
         ends = [*self.starts[1:], self.last + 1]
         most = [
             [np.max(own[k:end], axis=0, initial=0.0) for k, end in zip(self.starts, ends, strict=True)]
