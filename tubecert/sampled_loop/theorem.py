@@ -188,7 +188,7 @@ class Inequalities:
         constant = own.noise + own.wind + total(own.rounding, off)
         b = now + constant[lag] + self._slow(sizes) + self._first(k) + self._tail(phases, k)
         starts = [*(phase.start for phase in phases[1:]), self.last + 2]
-        slack = 8 * (own.lags + 8) * UNIT  # a difference of two sums from above
+        slack = 8 * (own.lags + 8) * UNIT + 4 * (SUMMED - 1)  # a difference of two sums from above
         for phase, end in zip(phases, starts, strict=True):
             answers = total(own.rho, phase.rho)
             newer, older = np.clip(k - phase.start, 0, lag), np.clip(k - end, 0, lag)
