@@ -57,7 +57,6 @@ def test_all_that_was_asked_for_is_read():
     assert own.trajectory.horizon == 2
     assert own.afterwards == "nothing"
     assert own.controller == "none"
-    assert own.half_widths == {"x": Fraction("0.1")}
     assert own.limits == {"u": (Fraction(-8), Fraction(8))}
     assert own.plant.gained is not None
     assert own.uncertainty.words == "expression"

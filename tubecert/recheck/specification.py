@@ -5,9 +5,10 @@ Its parts are read in `specified`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypeVar
 
 from tubecert.recheck.document import Members, Node, digest, wrong
 from tubecert.recheck.obstacles import Obstacle, read_obstacle
@@ -30,6 +31,8 @@ from tubecert.recheck.specified.trajectory import (
     read_trajectory,
 )
 from tubecert.recheck.times import period_of
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +60,7 @@ class Specification:
 class SampledSpecification:
     """A loop that a computer closes, without a metric; `hash` is of the canonical bytes.
 
-    `afterwards`: nothing, rest or repeat; nothing also where there is no horizon. `controller`: auto or none.
-    Half-widths are wishes, of which nothing is claimed.
+    `afterwards`: nothing (also where there is no horizon), rest or repeat. `controller`: auto or none.
     """
 
     plant: Plant
@@ -66,7 +68,6 @@ class SampledSpecification:
     trajectory: Trajectory
     afterwards: str
     start: Start
-    half_widths: dict[str, Fraction]
     obstacles: tuple[Obstacle, ...]
     limits: dict[str, Range]  # by input, of some of them
     hardware: Hardware
@@ -99,7 +100,7 @@ def read_specification(node: Node) -> Specification:
         half_widths=tube.get("half_widths", _widths) or {},
         loop=read_loop(own["adaptation"], own["conditions"]),
         obstacles=_obstacles(own, plant),
-        limits=own.get("limits", lambda item: _limits(item, plant.inputs)) or {},
+        limits=own.get("limits", lambda item: _some(item, plant.inputs, ends)) or {},
         disturbance=own.get("disturbance", lambda item: read_disturbance(item, plant.states)),
         hash=digest(node.value),
         content=digest({key: value for key, value in node.mapping().items() if key not in IDLE}),
@@ -116,7 +117,7 @@ def read_specification(node: Node) -> Specification:
 def read_sampled_specification(node: Node) -> SampledSpecification:
     """That of a loop that a computer closes; raises `CertificateError` for whatever is not of the canonical form.
 
-    B may depend on parameters known by ranges; f is free of t.
+    B may depend on parameters known by ranges; f is free of t. Half-widths are wishes, of which nothing is claimed.
     """
     own = node.closed(*_ALWAYS, "hardware", "controller", optional=(*IDLE[1:], "disturbance"))
     _version(own["tubecert"])
@@ -124,7 +125,8 @@ def read_sampled_specification(node: Node) -> SampledSpecification:
     plant = read_plant(own["system"], own["safe_set"])
     if plant.varies:
         raise own["system"].refused("has an f that depends on t, which a sampled loop may not have")
-    wishes = own["tube"].closed(optional=("half_widths",)).get("half_widths", lambda it: _wishes(it, plant))
+    wishes = own["tube"].closed(optional=("half_widths",))
+    wishes.get("half_widths", lambda item: _some(item, tuple(plant.lengths), positive))
     trajectory, afterwards = read_lasting(own["trajectory"], plant)
     states = plant.states
     found = SampledSpecification(
@@ -133,9 +135,8 @@ def read_sampled_specification(node: Node) -> SampledSpecification:
         trajectory=trajectory,
         afterwards=afterwards,
         start=read_start(own["initial_state"], states),
-        half_widths=wishes or {},
         obstacles=_obstacles(own, plant),
-        limits=own.get("limits", lambda item: _limits(item, plant.inputs)) or {},
+        limits=own.get("limits", lambda item: _some(item, plant.inputs, ends)) or {},
         hardware=read_hardware(own["hardware"], states),
         controller=own["controller"].word("auto", "none"),
         disturbance=own.get("disturbance", lambda item: read_disturbance(item, states, sampled=True)),
@@ -155,14 +156,6 @@ def _startable(own: Members, trajectory: Trajectory, start: Start) -> None:
     """Raises for a family of plans that does not start within a radius."""
     if isinstance(trajectory, AnyPlan) and start.within is None:
         raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
-
-
-def _wishes(node: Node, plant: Plant) -> dict[str, Fraction]:
-    """Half-widths of some states or outputs."""
-    node.closed(optional=tuple(plant.lengths))
-    if not node.mapping():
-        raise node.refused("must have half-widths of some states or outputs")
-    return _widths(node)
 
 
 def _moving(own: Members, found: Specification) -> None:
@@ -197,12 +190,12 @@ def _tube(node: Node, plant: Plant) -> Members:
     return own
 
 
-def _limits(node: Node, inputs: Sequence[str]) -> dict[str, Range]:
-    """Limits of some of the inputs, in their order."""
-    own = node.closed(optional=inputs)
+def _some(node: Node, names: Sequence[str], reads: Callable[[Node], T]) -> dict[str, T]:
+    """What is said of some of these, and of one at least, in their order."""
+    own = node.closed(optional=names)
     if not node.mapping():
-        raise node.refused("must have limits of an input")
-    return {name: ends(own[name]) for name in inputs if name in own}
+        raise node.refused(f"must name one of {', '.join(names)}")
+    return {name: reads(own[name]) for name in names if name in own}
 
 
 def _widths(node: Node) -> dict[str, Fraction]:
