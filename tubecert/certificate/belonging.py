@@ -23,6 +23,7 @@ from tubecert.spec import Setting, Spec, canonical
 from tubecert.spec.load import again
 from tubecert.spec.types import Table
 
+Rows = tuple[tuple[Fraction, ...], tuple[tuple[Fraction, ...], ...], tuple[tuple[Fraction, ...], ...]]
 _IDLE = ("name", "expect", "simulation", "system.units", "trajectory.file")
 
 
@@ -83,6 +84,28 @@ def compared(spec: Spec, result: Result) -> Belonging:
     )
 
 
+def compared_canonically(
+    spec: Spec, effective: Mapping[str, Any], settings: Mapping[str, str], file_hash: str, knots: Rows | None
+) -> Belonging:
+    """The same of a certificate that rests on the specification, the keys that were set, and knots t, x, u alone."""
+    own = again(spec, _settings(settings))
+    differing, table = _differing(canonical(own), effective), own.trajectory.table
+    if table is not None and (table.knots.t, table.knots.x, table.knots.u) != knots:
+        differing.append(f"the knots of {table.file}")
+    rewritten = _hash(hashlib.sha256(spec.source.encode()).hexdigest()) != file_hash
+    return Belonging(
+        serious=tuple(key for key in differing if key not in _IDLE),
+        idle=tuple(key for key in differing if key in _IDLE),
+        overridden=tuple(f"{visible(path)} = {visible(text)}" for path, text in sorted(settings.items())),
+        synthesised=False,
+        rewritten=("the file",) if rewritten else (),
+    )
+
+
+def _settings(texts: Mapping[str, str]) -> list[Setting]:
+    return [Setting(path=path, text=text) for path, text in sorted(texts.items())]
+
+
 def _told(overrides: Overrides) -> Iterator[str]:
     """Everything that the command line gave, with its value: whether it did so is not to be known from the file."""
     for key, value in to_json(overrides).items():
@@ -105,7 +128,7 @@ def _hash(digest: str) -> str:
 
 def as_set(spec: Spec, overrides: Overrides) -> Spec:
     """The specification with the keys that were set on the command line that certified."""
-    return again(spec, [Setting(path=path, text=text) for path, text in sorted(overrides.settings.items())])
+    return again(spec, _settings(overrides.settings))
 
 
 def _taken_over(own: dict[str, Any], effective: Mapping[str, Any], overrides: Overrides) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from tubecert.certificate.belonging import ForeignError, compared
+from tubecert.certificate.belonging import ForeignError, compared, compared_canonically
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.document import Node
 from tubecert.records import FormError
+from tubecert.sampled_loop.file import read
 
-__all__ = ["ForeignError", "belongs"]
+__all__ = ["ForeignError", "belongs", "sampled_belongs"]
 
 
 def belongs(document: Node, name: str, path: str) -> str:
@@ -23,5 +24,17 @@ def belongs(document: Node, name: str, path: str) -> str:
     except FormError as error:
         raise incomplete(name, str(error)) from error
     found = compared(loaded, result)
+    found.require(loaded, name)
+    return found.words(path)
+
+
+def sampled_belongs(text: str, name: str, path: str) -> str:
+    """The same of the file of a certificate of a sampled loop."""
+    from tubecert import spec
+
+    loaded, result = spec.load(path), read(text, name).result
+    own, plan = result.spec, result.planned
+    knots = None if plan is None else (plan.t, plan.x, plan.u)
+    found = compared_canonically(loaded, own.effective.data, own.settings, own.file_hash, knots)
     found.require(loaded, name)
     return found.words(path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
+from tubecert.certificate.file import FORMAT, parse
 from tubecert.cli import keeper, telling
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
@@ -15,6 +16,7 @@ from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.run import BUDGET, Examined, Recheck, recheck
+from tubecert.sampled_loop.record import FORMAT as SAMPLED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,8 +57,10 @@ def _heard(item: Examined) -> None:
 
 def _specification(path: str, text: str, name: str) -> str:
     """A sentence that says that the certificate is of a specification; raises TC604 if it is not."""
-    from tubecert.cli.belonging import belongs
+    from tubecert.cli.belonging import belongs, sampled_belongs
 
+    if parse(text.encode(), name, (FORMAT, SAMPLED))["format"] == SAMPLED:
+        return sampled_belongs(text, name, path)
     return belongs(document.read(text, name), name, path)
 
 

@@ -13,8 +13,6 @@ from fractions import Fraction
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from tubecert.certificate import file
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Bound, Certificate, MetricData, Result
@@ -22,7 +20,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.kinds import name_of
 from tubecert.kinds.data import Pair, SectionData
 from tubecert.library.specification import File, Specification
-from tubecert.library.stated import Stated, array
+from tubecert.library.stated import Stated, array, rounded_up
 from tubecert.records import FormError, Json
 from tubecert.report import gains as report_gains
 from tubecert.report.outline import widths
@@ -68,7 +66,7 @@ class Points:
     x: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Certification(Stated):
     """What a certification came to, whatever its verdict.
 
@@ -146,11 +144,7 @@ class Certification(Stated):
     @property
     def rho(self) -> float | None:
         """The radius of the tube, rounded up: |x - x*| <= rho, in coordinates of the tube if it has its own."""
-        tube = self.result.tube
-        if tube is None:
-            return None
-        near = float(tube.rho)
-        return near if Fraction(repr(near)) >= tube.rho else float(np.nextafter(near, np.inf))
+        return None if self.result.tube is None else rounded_up(self.result.tube.rho)
 
     @property
     def half_widths(self) -> Mapping[str, float]:

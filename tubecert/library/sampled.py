@@ -15,7 +15,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.library.specification import Specification
-from tubecert.library.stated import Stated, array
+from tubecert.library.stated import Stated, array, rounded_up
 from tubecert.progress import Progress
 from tubecert.sampled_loop.file import certificate_text
 from tubecert.sampled_loop.record import Certificate, Result, Shares
@@ -43,7 +43,7 @@ class Tube:
     plan: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class SampledCertification(Stated):
     """What the certification of a sampled loop came to, whatever its verdict.
 
@@ -97,7 +97,9 @@ class SampledCertification(Stated):
     def ranges(self) -> Mapping[str, tuple[float, float]]:
         """What each input stays within, plan and controller together: from below and from above, in its unit."""
         proven = self.result.inputs if self.certified else ()
-        return MappingProxyType({use.input: (-_up(-use.range[0]), _up(use.range[1])) for use in proven})
+        return MappingProxyType(
+            {use.input: (-rounded_up(-use.range[0]), rounded_up(use.range[1])) for use in proven}
+        )
 
     @property
     def shares(self) -> Mapping[str, Mapping[str, float]]:
@@ -191,13 +193,7 @@ def certification_of(certificate: Certificate, given: Specification | None = Non
 
 
 def _rounded_up(values: Mapping[str, Fraction]) -> Mapping[str, float]:
-    return MappingProxyType({name: _up(value) for name, value in values.items()})
-
-
-def _up(value: Fraction) -> float:
-    """The least float that is not below, or the next one."""
-    near = float(value)
-    return near if Fraction(near) >= value else float(np.nextafter(near, np.inf))
+    return MappingProxyType({name: rounded_up(value) for name, value in values.items()})
 
 
 def _parts(shares: Shares) -> Mapping[str, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from fractions import Fraction
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -100,6 +101,12 @@ class Stated:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self}>"
+
+
+def rounded_up(value: Fraction) -> float:
+    """The float whose shortest decimal is the nearest one that is not below the value."""
+    near = float(value)
+    return near if Fraction(repr(near)) >= value else float(np.nextafter(near, np.inf))
 
 
 def array(values: ArrayLike) -> Array:

@@ -109,4 +109,13 @@ def findings(name: str, found: Sequence[Finding]) -> str:
 def of_page(page: Page) -> str:
     """The card of a page: what it says, and its tables."""
     tables = [block for section in page.sections for block in section.blocks if isinstance(block, Table)]
-    return render(Card(verdict="", name=page.name, summary=page.summary, meaning=page.meaning, tables=tables))
+    return render(
+        Card(
+            verdict=page.verdict,
+            style=page.verdict,
+            name=page.name,
+            summary=page.summary,
+            meaning=page.meaning,
+            tables=tables,
+        )
+    )

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Final
 
-from tubecert.digits import down, exact, short, up
+from tubecert.digits import down, exact, up
 from tubecert.report.claimed import NOT_RECHECKED, started
 from tubecert.report.figures_sampled import figures, period
 from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Section, Table, Tile
@@ -91,9 +91,9 @@ def _first(result: Result) -> Sequence[str]:
 def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) -> Table:
     """Half-widths at the start, in the long run, as wished; `notes` say what fills them, inputs as well."""
     system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
-    stages = result.tube if notes or len(result.tube) < 2 else (result.tube[0], result.tube[-1])
+    stages = result.tube[:1] + result.tube[1:][-1:]
     filled = notes.filled if notes else {}
-    when = (f"t >= {short(stage.start * period(result), 4)} s" for stage in stages)
+    when = (f"t >= {up(stage.start * period(result))} s" for stage in stages)
     title = "half-widths" if result.verdict is Verdict.CERTIFIED else "not proven"
     grid = [[title, *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
     for name in (*names, *(system.inputs if notes else ())):
