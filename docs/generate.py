@@ -9,14 +9,19 @@ import json
 import re
 import sys
 from collections.abc import Iterator
+from dataclasses import is_dataclass
 from decimal import ROUND_CEILING, Context
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from tubecert import records  # noqa: E402
+from tubecert.certificate.effective import Effective  # noqa: E402
+from tubecert.records import refer  # noqa: E402
 from tubecert.report import pages  # noqa: E402
+from tubecert.sampled_loop.record import FORMAT, HexMatrix, Notes, Result  # noqa: E402
 
 REFERENCE = ROOT / "docs" / "reference"
 _NOTE = "<!-- written by docs/generate.py; do not edit -->"
@@ -279,9 +284,98 @@ def _readme_row(source: str, group: list[dict[str, Any]]) -> str:
     return f"| {source} | {len(group)} | {len(group) - len(failed)} | {told} |"
 
 
+def sampled_loop() -> dict[str, Any]:
+    """The schema of certificates of sampled loops, from their records and the words of these."""
+    refer(HexMatrix, "matrix")
+    refer(Effective, "specification")
+    result, notes = (_described(records.schema(kind), kind) for kind in (Result, Notes))
+    words = {
+        "format": ({"const": FORMAT}, "Version of the format."),
+        "hash": (
+            {"type": "string"},
+            "SHA-256 of the canonical bytes of `result`: UTF-8, sorted keys, no spaces.",
+        ),
+        "result": (result, "What was proven. This is hashed, and `recheck` examines it."),
+        "notes": (notes, "What explains and claims nothing: neither hashed nor examined."),
+        "run": ({"type": "object"}, "How it was made: command line, versions, times; not hashed."),
+    }
+    row = {"type": "array", "items": {"type": "string", "description": "A float in hexadecimal."}}
+    matrix = {
+        "columns": {"type": "integer", "description": "How many."},
+        "rows": {"type": "array", "items": row},
+    }
+    matrix["rows"]["description"] = "Row by row, every number exact."
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "urn:tubecert:sampled-loop:1",
+        "title": "tubecert certificate of a sampled loop",
+        "description": "What `certify` writes for a specification with `hardware`, for every verdict.",
+        "type": "object",
+        "required": list(words),
+        "properties": {key: {**form, "description": told} for key, (form, told) in words.items()},
+        "$defs": {
+            "decimal": {
+                "description": "An exact decimal, or a quotient as text.",
+                "type": ["number", "string"],
+            },
+            "specification": {"description": "An effective specification.", "type": "object"},
+            "matrix": {
+                "description": "A matrix.",
+                "type": "object",
+                "required": [*matrix],
+                "properties": matrix,
+            },
+        },
+    }
+
+
+def _described(form: dict[str, Any], kind: Any) -> dict[str, Any]:
+    """A record's schema, closed, with the sentence of its words that names each key, or else all of them."""
+    words = " ".join((kind.__doc__ or "").split())
+    hints = {item.name: hint for item, hint in records.members(kind)}
+    sentences = re.split(r"(?<=[.;]) ", words.replace("| None", ""))
+    for key, value in form["properties"].items():
+        inner = next(filter(is_dataclass, (hints[key], *get_args(hints[key]))), None)
+        target = next((each for each in _forms(value) if "properties" in each), None)
+        if inner is not None and target is not None:
+            _described(target, inner)
+        own = (
+            " ".join((inner.__doc__ or "").partition("\n\n")[0].split())
+            if inner
+            else f"{key}.".replace("_", " ")
+        )
+        told = next((sentence.rstrip(";") for sentence in sentences if f"`{key}`" in sentence), own)
+        form["properties"][key] = _of_one_kind(value) | {"description": told}
+    form["additionalProperties"] = False
+    return form
+
+
+def _forms(value: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """A schema and those within it."""
+    inner = [value[key] for key in ("items", "additionalProperties") if isinstance(value.get(key), dict)]
+    yield value
+    for each in (*inner, *value.get("anyOf", ())):
+        yield from _forms(each)
+
+
+def _of_one_kind(value: dict[str, Any]) -> dict[str, Any]:
+    """A list of fixed length, all of whose entries are alike, as such."""
+    if "items" in value:
+        return value | {"items": _of_one_kind(value["items"])}
+    if "prefixItems" not in value:
+        return value
+    count = len(value["prefixItems"])
+    return {"type": "array", "items": value["prefixItems"][0], "minItems": count, "maxItems": count}
+
+
 def everything() -> dict[str, str]:
     """The text of every page by its file name."""
-    schemas = {"specification": "spec", "metric": "metric", "certificate": "certificate"}
+    schemas = {
+        "specification": "spec",
+        "metric": "metric",
+        "certificate": "certificate",
+        "sampled-loop": "sampled-loop",
+    }
     made = {}
     for name, short in schemas.items():
         path = ROOT / "tubecert" / "schemas" / f"{short}.schema.json"
@@ -292,6 +386,8 @@ def everything() -> dict[str, str]:
 def main() -> None:
     """Write the pages."""
     REFERENCE.mkdir(exist_ok=True)
+    text = json.dumps(sampled_loop(), indent=2, ensure_ascii=False) + "\n"
+    (ROOT / "tubecert" / "schemas" / "sampled-loop.schema.json").write_text(text, encoding="utf-8")
     for name, text in everything().items():
         (REFERENCE / name).write_text(text, encoding="utf-8")
     page = ROOT / "README.md"

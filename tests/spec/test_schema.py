@@ -58,7 +58,7 @@ def as_editor(path: Path) -> Any:
 @pytest.mark.parametrize("name", sorted(SCHEMAS))
 def test_schemas_are_schemas(name):
     jsonschema.Draft202012Validator.check_schema(SCHEMAS[name])
-    assert set(SCHEMAS) == {"spec", "metric", "certificate"}
+    assert set(SCHEMAS) == {"spec", "metric", "certificate", "sampled-loop"}
 
 
 def described(schema: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -176,7 +176,7 @@ metric: {rate: 1, dual_metric: [[1]], bounds: {lower: 1, upper: 1}}
 tube: {epsilon: 1, rho_a: 1}
 adaptation: {A_m: -1, projection: {smooth: 0.1}}
 conditions: {decides: B}
-expect: {verdict: certified}
+expect: {verdict: certified, half_widths: {x: [0, 1]}}
 """
 
 
@@ -199,7 +199,7 @@ def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path)
     assert all(met), "a section that no example file of tests/specs/ok has"
     # their keys are states or inputs
     box = {"tube.half_widths", "trajectory.x", "trajectory.u", "limits", "hardware.noise", "hardware.limits"}
-    box |= {"trajectory.input_rate"}
+    box |= {"trajectory.input_rate", "expect.half_widths"}
     for (path, kind), known in asked.known.items():
         if path in box or path.startswith("uncertainty.bounds."):  # bounds of an input
             continue
@@ -314,6 +314,7 @@ def test_the_reference_is_what_the_schemas_say():
     sys.path.insert(0, str(ROOT / "docs"))
     import generate
 
+    assert generate.sampled_loop() == SCHEMAS["sampled-loop"], "run python docs/generate.py"
     for name, text in generate.everything().items():
         assert (ROOT / "docs" / "reference" / name).read_text("utf-8") == text, "run python docs/generate.py"
     page = (ROOT / "README.md").read_text("utf-8")

@@ -64,6 +64,7 @@ class Schema(StrEnum):
     SPEC = "spec"
     METRIC = "metric"
     CERTIFICATE = "certificate"
+    SAMPLED_LOOP = "sampled-loop"
 
 
 class Template(StrEnum):
@@ -151,12 +152,12 @@ def check(
 def schema(
     context: typer.Context,
     name: Annotated[
-        Schema, typer.Argument(metavar="spec|metric|certificate", help="Of what.", show_default=False)
+        Schema, typer.Argument(metavar="spec|metric|certificate|sampled-loop", help="Of what.", show_default=False)
     ] = Schema.SPEC,
     *,
     debug: Debug = False,
 ) -> None:
-    """Show a JSON Schema: of specifications (for editors), of metric files, of certificates."""
+    """Show a JSON Schema: of specifications (for editors), of metric files, of certificates, of those with hardware."""
     with guarded(Output(debug=debug)):
         from tubecert.cli.schema import run
 

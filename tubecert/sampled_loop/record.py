@@ -228,9 +228,11 @@ class Shares:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Notes:
-    """What explains a result and claims nothing: shares of the tube at the start, in the long run and of the inputs.
+    """What explains a result and claims nothing.
 
-    `attainable`: the sizes of what the loop would have without remainders. `samples`: points of the plan to draw.
+    `start` and `long_run`: what fills each half-width in the first and in the last stage; `deviations`: each input.
+    `constants`: sizes of what acts. `samples_t`, `samples_x` and `samples_u` are points of the plan, to be drawn.
+    `evaluations`: how many controllers were tried.
     """
 
     start: Mapping[str, Shares] = field(default_factory=dict)
