@@ -15,6 +15,7 @@ TRUSTED_ROOMS = {
     "errors", "findings", "claims", "records", "digits", "verdict", "letters", "progress", "printable",
     "files", "leash", "executor", "expression", "spec", "enclosure", "model", "coordinates", "metric",
     "trajectory", "tube", "bounds", "conditions", "kernel", "kinds", "certificate", "stages", "recheck",
+    "sampled_loop",
 }  # fmt: skip
 SAYS_CERTIFIED = "kernel.py"  # the one module in which gains become certified
 ALSO_SAY = {  # of one claim each, no gains
@@ -24,6 +25,8 @@ ALSO_SAY = {  # of one claim each, no gains
     "model/rank.py": "the rank of a B with a minor that is a constant",
     "metric/verify.py": "C1-C3",
     "tube/containment.py": "the tube lies in the safe set",
+    "sampled_loop/theorem.py": "a sampled loop keeps its tube",
+    "sampled_loop/obstacles.py": "its tube keeps away from an obstacle",
 }
 
 

@@ -152,7 +152,8 @@ def check(
 def schema(
     context: typer.Context,
     name: Annotated[
-        Schema, typer.Argument(metavar="spec|metric|certificate|sampled-loop", help="Of what.", show_default=False)
+        Schema,
+        typer.Argument(metavar="spec|metric|certificate|sampled-loop", help="Of what.", show_default=False),
     ] = Schema.SPEC,
     *,
     debug: Debug = False,

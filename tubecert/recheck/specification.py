@@ -131,7 +131,7 @@ def read_sampled_specification(node: Node) -> SampledSpecification:
     states = plant.states
     found = SampledSpecification(
         plant=plant,
-        uncertainty=read_uncertainty(own["uncertainty"], plant),
+        uncertainty=read_uncertainty(own["uncertainty"], plant, sudden=True),
         trajectory=trajectory,
         afterwards=afterwards,
         start=read_start(own["initial_state"], states),

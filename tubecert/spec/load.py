@@ -268,7 +268,11 @@ def _read_named(
     known = _in_the_middle(f, B, dynamics, names)
     units = read_units(system.get("units"), names)
     box = read_box(entries["safe_set"], names) if "safe_set" in entries else None
-    uncertainty = read_uncertainty(entries["uncertainty"], names) if "uncertainty" in entries else None
+    uncertainty = (
+        read_uncertainty(entries["uncertainty"], names, sudden="hardware" in entries)
+        if "uncertainty" in entries
+        else None
+    )
     if "hardware" in entries and "uncertainty" not in entries:
         uncertainty = no_uncertainty(entries["hardware"], len(names.inputs))
     trajectory = entries.get("trajectory")

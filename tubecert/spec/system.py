@@ -103,8 +103,8 @@ def _independent(field: Field, matrix: TermMatrix) -> bool:
     return False
 
 
-def read_uncertainty(field: Field, names: Names) -> Uncertainty | None:
-    """Expressions, declared bounds, or both."""
+def read_uncertainty(field: Field, names: Names, *, sudden: bool) -> Uncertainty | None:
+    """Expressions, declared bounds, or both; `sudden`: of an h without expressions a bound of its size will do."""
     entries = field.mapping(optional=("h", "bounds"))
     if entries is None:
         return None
@@ -119,19 +119,20 @@ def read_uncertainty(field: Field, names: Names) -> Uncertainty | None:
     if "h" in entries:
         h = entries["h"].terms(len(names.inputs), names.of_uncertainty(), "expressions, one per input")
     if "bounds" in entries:
-        bounds = _read_bounds(entries["bounds"], names, complete="h" not in entries)
+        needed = () if "h" in entries else ("h",) if sudden else _BOUNDS
+        bounds = _read_bounds(entries["bounds"], names, needed)
     if ("h" in entries and h is None) or ("bounds" in entries and bounds is None):
         return None
     return Uncertainty(h=h, bounds=bounds)
 
 
-def _read_bounds(field: Field, names: Names, *, complete: bool) -> Bounds | None:
-    """Declared bounds; all three of them if there is no expression to derive the others from."""
+def _read_bounds(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | None:
+    """Declared bounds, those that are needed among them."""
     if isinstance(field.node, MappingNode) and any(
         isinstance(node, MappingNode) for _, node in field.node.pairs
     ):
-        return _combined(field, names, complete=complete)
-    entries = field.mapping(required=() if not complete else _BOUNDS, optional=() if complete else _BOUNDS)
+        return _combined(field, names, needed)
+    entries = field.mapping(required=needed, optional=tuple(key for key in _BOUNDS if key not in needed))
     if entries is None:
         return None
     values = {key: entry.number(names.values, least=0, side="above") for key, entry in entries.items()}
@@ -140,7 +141,7 @@ def _read_bounds(field: Field, names: Names, *, complete: bool) -> Bounds | None
     return Bounds(h=values.get("h"), h_x=values.get("h_x"), h_t=values.get("h_t"))
 
 
-def _combined(field: Field, names: Names, *, complete: bool) -> Bounds | None:
+def _combined(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | None:
     """Bounds of the components of h, input by input: h is bounded by the root of the sum of their squares.
 
     So are |dh/dt|, and |h(t, x) - h(t, y)| <= sqrt(sum L_i^2)|x - y|. Bounds of one kind are given for all or none.
@@ -148,7 +149,7 @@ def _combined(field: Field, names: Names, *, complete: bool) -> Bounds | None:
     entries = field.mapping(required=names.inputs)
     if entries is None or len(entries) < len(names.inputs):
         return None
-    found = [_read_bounds(entries[name], names, complete=complete) for name in names.inputs]
+    found = [_read_bounds(entries[name], names, needed) for name in names.inputs]
     parts = [part for part in found if part is not None]
     if len(parts) < len(found):
         return None

@@ -130,7 +130,9 @@ def _name(step: Step) -> str:
     """What is worked on as reports call it: a constant by its words."""
     if step.phase is Phase.GAINS:
         return _LETTERS.get(step.name, step.name)
-    if step.phase not in _OF_CONSTANTS or step.unit is not Unit.BOXES:  # a search over boxes bounds a constant
+    if (
+        step.phase not in _OF_CONSTANTS or step.unit is not Unit.BOXES
+    ):  # a search over boxes bounds a constant
         return step.name
     from tubecert.bounds.meanings import EVERY  # with numerics, which are there where constants are bounded
 

@@ -156,8 +156,8 @@ def _names(node: Node, given: Sequence[str]) -> None:
         raise node.refused("uses a name twice")
 
 
-def read_uncertainty(node: Node, plant: Plant) -> Uncertainty:
-    """`uncertainty`."""
+def read_uncertainty(node: Node, plant: Plant, *, sudden: bool = False) -> Uncertainty:
+    """`uncertainty`; where h may be `sudden`, a bound of its size is enough."""
     own = node.closed(optional=("h", "bounds"))
     reader = Reader.of((*plant.states, TIME), plant.tables, kinks=True)
     h = own.get("h", lambda item: reader.column(item, len(plant.inputs)))
@@ -165,6 +165,6 @@ def read_uncertainty(node: Node, plant: Plant) -> Uncertainty:
     if "bounds" in own:
         own["bounds"].closed(optional=("h", "h_x", "h_t"))
         declared = {key: not_negative(value) for key, value in own["bounds"].items()}
-    if h is None and len(declared) < 3:
+    if h is None and not declared.keys() >= ({"h"} if sudden else {"h", "h_x", "h_t"}):
         raise node.refused("must give h, or bounds for h, h_x and h_t")
     return Uncertainty(h, declared, tuple(reader.duties))
