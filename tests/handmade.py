@@ -6,14 +6,17 @@ import numpy as np
 
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
+from tubecert.expression import number_text
 from tubecert.sampled_loop.file import seal
 from tubecert.sampled_loop.record import (
     Certificate,
     Claim,
     HexMatrix,
     InputUse,
+    Nominal,
     Notes,
     PlanKnots,
+    Recipe,
     Result,
     Source,
     Stage,
@@ -65,15 +68,17 @@ def certificate(
     data = canonical(load_text(text))
     if planned is not None:  # through knots, as from a planner
         data["trajectory"] = {"kind": "csv", "file": "plan.csv", "interpolation": planned.interpolation}
-        data["trajectory"] |= {"horizon": str(planned.t[-1])} | (
-            {"afterwards": afterwards} if afterwards != "nothing" else {}
-        )
+        data["trajectory"] |= {"horizon": number_text(planned.t[-1]), "afterwards": afterwards}
     stages = [(0, "0.3", "0.5"), (40, "0.2", "0.6")]
     fields = {
         "verdict": Verdict.CERTIFIED,
         "spec": Source(effective=Effective.of(data), effective_hash=digest(data), file_hash="sha256:0"),
         "claim": Claim(horizon=None, afterwards=afterwards, hold=hold),
         "planned": planned,
+        "nominal": Nominal(
+            **{name: HexMatrix(np.zeros((2, size))) for name, size in (("A", 2), ("B", 1), ("E", 0))}
+        ),
+        "recipe": Recipe(lags=1, cuts=((),) * (3 + z), pieces=1, panels=1, windows=1, parameters="slow"),
         "controller": tables(z) if controller is None else controller,
         "tube": tuple(
             Stage(
@@ -87,3 +92,10 @@ def certificate(
         "inputs": (InputUse(input="F", range=(Fraction("-3.1"), Fraction("3.3"))),),
     }
     return seal(Result(**(fields | changes)), Notes(), {})
+
+
+def held_knots() -> PlanKnots:
+    """u* jumps at t = .1 and .2; x* is at rest at the knots."""
+    rest = (Fraction(0), Fraction(0))
+    t, u = (Fraction(0), Fraction("0.1"), Fraction("0.2")), ((Fraction(1),), (Fraction(2),), (Fraction(3),))
+    return PlanKnots(t=t, x=(rest,) * 3, u=u, interpolation="hold")

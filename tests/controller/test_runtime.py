@@ -15,7 +15,7 @@ from tubecert.controller.compiled import BAD, CLIPPED, END, Controller, build
 from tubecert.controller.data import HOME, data_of, exact_step
 from tubecert.controller.folder import RUNTIME, files_of, marked, write
 from tubecert.errors import ExitCode, TubecertError
-from tubecert.sampled_loop.record import Lack, PlanKnots
+from tubecert.sampled_loop.record import Lack
 from tubecert.verdict import Verdict
 
 WAVE = handmade.WAVE % ""
@@ -40,13 +40,6 @@ def feedforward(trajectory=handmade.REST, **options):
     tables.M.value[:] = 0
     tables.N.value[:] = [[1e-30, 0]]  # some controller
     return loop(trajectory, z=1, controller=tables, **options)
-
-
-def held_knots():
-    """u* jumps at t = .1 and .2; x* is at rest at the knots."""
-    t = (Fraction(0), Fraction("0.1"), Fraction("0.2"))
-    rest = (Fraction(0), Fraction(0))
-    return PlanKnots(t=t, x=(rest,) * 3, u=tuple((Fraction(u),) for u in (1, 2, 3)), interpolation="hold")
 
 
 def shipped(folder, **options):
@@ -118,7 +111,7 @@ def test_where_the_input_jumps_it_is_taken_from_its_interval(afterwards, steps, 
 
     The command of the last row acts beyond the end, over [.185, .205): there the plan is what comes afterwards.
     """
-    own = feedforward(planned=held_knots(), afterwards=afterwards)
+    own = feedforward(planned=handmade.held_knots(), afterwards=afterwards)
     assert own.data.plan.steps == steps
     rows = own.data.plan.at(range(steps))[0]
     order = [*range(10), *(range(5) if afterwards == "repeat" else [steps - 1] * 5)]

@@ -1,0 +1,69 @@
+/* tubecert export, certificate any, text sha256:dc67c2fd2f9dfc58375b6680108b897857a64f08bff31384adaac26794a03cb5 */
+/* delta = M zeta + N dy, u = us + delta, zeta' = F zeta + G dy, with dy = y - xs. Every order of these sums, with fused
+   multiply-adds or without, loses at most gamma(NZ + NX + 3) of the sum of their sizes, which is proven for. */
+#define CONTROLLER_TABLES
+#include "controller.h"
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "compile without -ffast-math: it removes the test for what is not a number"
+#endif
+
+static real clip(real v, real low, real high) { return v >= low ? (v <= high ? v : high) : low; }
+
+void controller_start(State *s) {
+  static const State nothing;
+  *s = nothing;
+}
+
+#ifdef PLAN_TABLE
+static void plan(uint32_t k, real xs[NX], real us[NU]) {
+  const uint32_t row = k < STEPS ? k : STEPS - 1;
+  for (int i = 0; i < NX; i++) xs[i] = XS[row][i];
+  for (int j = 0; j < NU; j++) us[j] = US[row][j];
+}
+#endif
+
+uint32_t controller_step(State *s, const real y[NX], PLAN_GIVEN real u[NU]) {
+  real dy[NX], zeta[NZ ? NZ : 1];
+  uint32_t status = s->k < STEPS ? 0 : STATUS_END;
+#ifndef PLAN_HANDED
+  real xs[NX], us[NU];
+  plan(s->k, xs, us);
+#endif
+  for (int i = 0; i < NX; i++) {
+    dy[i] = y[i] - xs[i];
+    if (!(dy[i] >= -REACH[i] && dy[i] <= REACH[i]) && s->k < STEPS) status |= STATUS_BAD; /* NaN as well */
+  }
+  const int used = status == 0;
+  for (int j = 0; j < NU; j++) { /* the inputs first: what comes after them delays nothing */
+    if (used) {
+      real sum = 0;
+      for (int i = 0; i < NZ; i++) sum += M[j][i] * s->zeta[i];
+      for (int i = 0; i < NX; i++) sum += N[j][i] * dy[i];
+      s->delta[j] = sum;
+    }
+    const real wanted = us[j] + s->delta[j];
+    u[j] = clip(wanted, LOW[j], HIGH[j]);
+    if (u[j] != wanted) status |= STATUS_CLIPPED;
+  }
+  if (used) {
+    for (int i = 0; i < NZ; i++) {
+      real sum = 0;
+      for (int j = 0; j < NZ; j++) sum += F[i][j] * s->zeta[j];
+      for (int j = 0; j < NX; j++) sum += G[i][j] * dy[j];
+      zeta[i] = clip(sum, -MEMORY[i], MEMORY[i]);
+    }
+    for (int i = 0; i < NZ; i++) s->zeta[i] = zeta[i];
+  }
+  s->bad += status & STATUS_BAD;
+  if (s->k < STEPS && ++s->k == STEPS) s->k = AFTER;
+  return s->status = status;
+}
+
+void controller_step_many(State *s, size_t n, const real *y, PLAN_GIVEN real *u) {
+  for (size_t i = 0; i < n; i++)
+#ifdef PLAN_HANDED
+    controller_step(s + i, y + i * NX, xs + i * NX, us + i * NU, u + i * NU);
+#else
+    controller_step(s + i, y + i * NX, u + i * NU);
+#endif
+}
