@@ -11,7 +11,7 @@ from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
 from tubecert.errors import ExitCode
 from tubecert.library.numbers import Numbers
-from tubecert.library.rechecking import text_of, told, verdict_line
+from tubecert.library.rechecking import text_of, told, verdict_line, with_controller
 from tubecert.printable import harmless, printable_json, visible
 from tubecert.recheck import document
 from tubecert.recheck.cover import Outcome
@@ -27,6 +27,7 @@ class Given:
     spec: str | None
     budget: str | None
     deadline: str | None
+    controller: str | None = None
 
 
 def run(given: Given, output: Output) -> ExitCode:
@@ -45,6 +46,8 @@ def run(given: Given, output: Output) -> ExitCode:
     with telling.shown(terminal, output) as show:
         report, most = None if show is None else told(show), BUDGET if budget is None else budget
         found = recheck(text, name, most, report, seconds=limit, heard=_heard)
+    if given.controller is not None:
+        found = with_controller(found, text, name, given.controller)
     shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
     write_stdout(shown)
     keeper.tell({"said": True})

@@ -13,6 +13,7 @@ _AFTER = """\b
 Examples:
   tubecert recheck plant.certificate.json
   tubecert recheck plant.certificate.json --spec plant.yaml
+  tubecert recheck plant.certificate.json --controller plant.controller
   tubecert recheck plant.certificate.json --json | jq .first_failing
 
 \b
@@ -46,12 +47,18 @@ def recheck(
         str | None,
         typer.Option(metavar="NUMBER", help="Seconds after which what is not proven is undecided."),
     ] = None,
+    controller: Annotated[
+        str | None,
+        typer.Option(metavar="FOLDER", help="Also: that what export wrote there is of the certificate."),
+    ] = None,
     how: Output,
 ) -> None:
     """Verify every claim of a certificate again: in ball arithmetic, with derivatives of its own, without a solver."""
     with guarded(how):
         from tubecert.cli.recheck import Given, run
 
-        given = Given(certificate=certificate, spec=spec, budget=budget, deadline=deadline)
+        given = Given(
+            certificate=certificate, spec=spec, budget=budget, deadline=deadline, controller=controller
+        )
         code = run(given, how)
     raise typer.Exit(code)

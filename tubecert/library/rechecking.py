@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tubecert.certificate.file import KIND, unreadable
@@ -11,8 +11,11 @@ from tubecert.errors import ExitCode
 from tubecert.files import STDIN, read, read_stdin
 from tubecert.library.numbers import Numbers
 from tubecert.progress import Phase, Progress, Step
+from tubecert.recheck import document
 from tubecert.recheck.run import BUDGET, Examined, Recheck, Report
 from tubecert.recheck.run import recheck as examined
+from tubecert.recheck.sampled_loop.exported import exported
+from tubecert.recheck.sampled_loop.record import read_certificate
 from tubecert.report.progress import timed
 
 if TYPE_CHECKING:  # of the producer, which takes longer to import than many certificates to examine
@@ -69,11 +72,13 @@ def recheck(
     *,
     budget: int | None = None,
     deadline: Number | None = None,
+    controller: File | None = None,
     progress: Progress | None = None,
 ) -> Rechecked:
     """Examines every claim of a certificate, or of the file of one, in ball arithmetic and without a solver.
 
-    `budget`: boxes per claim before giving up; what is not proven `deadline` s from now is undecided.
+    `budget`: boxes per claim before giving up; what is not proven `deadline` s from now is undecided. `controller`: a
+    folder that `export` wrote, whose code and numbers are compared with the certificate of a sampled loop.
     Raises `TubecertError` for what is no certificate.
     """
     from tubecert.library.plain import number_texts
@@ -91,7 +96,22 @@ def recheck(
     report = None if shown is None else told(shown)
     limit = None if seconds is None else float(seconds)
     found = examined(text, name, BUDGET if most is None else most, report, seconds=limit)
+    if controller is not None:
+        found = with_controller(found, text, name, os.fspath(controller))
     return Rechecked(found=found, name=name)
+
+
+def with_controller(found: Recheck, text: str, name: str, folder: str) -> Recheck:
+    """The same, with the claims of a folder of exported code.
+
+    Raises `CertificateError` for the certificate of a loop in continuous time.
+    """
+    own = document.read(text, name)
+    if own.mapping()["format"] != document.SAMPLED_LOOP:
+        help = "leave --controller out, or give the certificate of a specification with hardware"
+        raise document.wrong("TC601", f"{name} is about a loop in continuous time, which has no code", help)
+    more = (Examined(*each) for each in exported(read_certificate(own), folder))
+    return replace(found, claims=(*found.claims, *more))
 
 
 def text_of(name: str) -> str:
