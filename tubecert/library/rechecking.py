@@ -14,8 +14,6 @@ from tubecert.progress import Phase, Progress, Step
 from tubecert.recheck import document
 from tubecert.recheck.run import BUDGET, Examined, Recheck, Report
 from tubecert.recheck.run import recheck as examined
-from tubecert.recheck.sampled_loop.exported import exported
-from tubecert.recheck.sampled_loop.record import read_certificate
 from tubecert.report.progress import timed
 
 if TYPE_CHECKING:  # of the producer, which takes longer to import than many certificates to examine
@@ -106,6 +104,9 @@ def with_controller(found: Recheck, text: str, name: str, folder: str) -> Rechec
 
     Raises `CertificateError` for the certificate of a loop in continuous time.
     """
+    from tubecert.recheck.sampled_loop.exported import exported
+    from tubecert.recheck.sampled_loop.record import read_certificate
+
     own = document.read(text, name)
     if own.mapping()["format"] != document.SAMPLED_LOOP:
         help = "leave --controller out, or give the certificate of a specification with hardware"
