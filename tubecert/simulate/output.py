@@ -38,7 +38,7 @@ def prepared(folder: str) -> Iterator[None]:
         with tempfile.TemporaryFile(dir=path):
             pass
     except (OSError, ValueError) as error:
-        raise _unwritable(folder, error) from None
+        raise unwritable(folder, error) from None
     try:
         yield
     finally:
@@ -61,7 +61,7 @@ def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
             replace(Path(folder) / name, data)
             written.append(name)
     except OSError as error:
-        raise _unwritable(folder, error) from None
+        raise unwritable(folder, error) from None
     return written
 
 
@@ -176,7 +176,8 @@ def _cell(value: float) -> str:
     return f"{value:.0f}" if value == int(value) and abs(value) < 1e15 else f"{value:.9g}"
 
 
-def _unwritable(folder: str, error: Any) -> TargetError:
+def unwritable(folder: str, error: Any) -> TargetError:
+    """The error for a folder that cannot be written to."""
     why = (getattr(error, "strerror", None) or str(error)).lower()
     message = f"cannot write to the folder {folder}: {why}"
     return TargetError([Finding(code="TC120", message=message, help="choose another folder with -o FOLDER")])

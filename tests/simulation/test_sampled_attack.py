@@ -1,0 +1,101 @@
+"""Adversaries: what they attain on loops without remainders, what they never exceed, and that they find lies."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from loops import proven, setting
+from scipy.optimize import linprog
+
+from tubecert.sampled_loop.record import HexMatrix
+from tubecert.simulation import campaign
+from tubecert.simulation.attack import Attack
+from tubecert.simulation.campaign import simulate, summary
+from tubecert.simulation.kernels import goals
+
+
+def followed(aims, size, rate):
+    """What a signal comes to that goes where it is sent: values at the ends of samples, the oldest first."""
+    h = [aims[-1]]
+    for aim in aims[::-1]:
+        h.append(np.clip(aim, h[-1] - rate, h[-1] + rate))
+    return np.clip(h, -size, size)
+
+
+@pytest.mark.parametrize("rate", [0.02, 0.3, 5.0, np.inf])
+def test_a_slow_signal_does_its_worst_as_a_linear_program_says(rate):
+    weights = np.random.default_rng(3).normal(size=60).cumsum()
+    h = followed(goals(weights, 1.0, rate), 1.0, rate)
+    cost = np.append(weights[::-1] / 2, 0) + np.append(0, weights[::-1] / 2)
+    steps = np.eye(60, 61, 1) - np.eye(60, 61)
+    most = np.full(120, min(rate, 2.0))
+    best = linprog(-cost, A_ub=np.vstack([steps, -steps]), b_ub=most, bounds=(-1, 1))
+    assert cost @ h == pytest.approx(-best.fun, rel=0.03)
+    assert cost @ h <= -best.fun * (1 + 1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["scalar", "cart"])
+def test_a_loop_without_remainders_is_driven_to_its_edge_and_not_beyond(name):
+    found = summary(simulate(setting(name), "hash", runs=30, seed=0))
+    assert found.outcome == "not falsified"
+    assert found.error < 1e-6
+    for own in (*found.states.values(), *found.inputs.values()):
+        assert 0.95 < own.adversary.share <= 1
+        assert own.adversary_by_stage[-1] > 0.93
+        assert own.random.share <= 1
+
+
+def sabotaged(how):
+    """A loop whose certificate is a lie."""
+    if how == "h":
+        return setting("cart", ("0.2*sin", "0.3*sin"))
+    own = setting("cart")
+    if how == "sign":
+        return replace(own, tables=replace(own.tables, N=HexMatrix(own.tables.N.value * [[1, -1]])))
+    return replace(own, bounds=0.9 * own.bounds)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["h", "sign", "width"])
+def test_a_lie_is_found_with_seed_run_and_time(how):
+    own = sabotaged(how)
+    found = summary(simulate(own, "hash", runs=20, seed=4))
+    assert (found.outcome, found.seed) == ("falsified", 4)
+    first = found.violations[0]
+    attack = Attack(setting=own, seed=4)
+    again = campaign._chunk(attack, attack.lanes(first.run, first.run + 1), campaign.controllers_of(own))
+    assert again.peaks.left[0] == first.t
+    assert own.names[again.peaks.what[0]] == first.of
+
+
+@pytest.mark.slow
+def test_what_is_finished_stays_and_the_same_seed_says_the_same(monkeypatch):
+    monkeypatch.setattr(campaign, "LANES", 32)
+    told = []
+
+    def stop(step):
+        told.append(step.done)
+        if step.done >= 64:
+            raise KeyboardInterrupt
+
+    own = setting("scalar")
+    whole, some = simulate(own, "h", runs=60, seed=1), simulate(own, "h", runs=60, seed=1, report=stop)
+    assert (some.outcome, some.runs, told) == ("interrupted", 64, [0, 32, 64])
+    np.testing.assert_array_equal(whole.all("share")[:, :64], some.all("share"))
+    assert summary(whole).to_json()["states"]["x"]["random_by_stage"]
+    assert (simulate(own, "h", runs=60, seed=2).all("share")[:, 60:] != whole.all("share")[:, 60:]).any()
+
+
+@pytest.mark.slow
+def test_inputs_and_obstacles_are_judged_as_well():
+    own = setting("cart")
+    use = own.result.inputs[0]
+    narrow = replace(own.result, inputs=(replace(use, range=(Fraction(-1, 10), use.range[1])),))
+    near = replace(own, result=narrow)
+    assert simulate(near, "h", runs=0, seed=0).outcome == "falsified"
+    assert summary(simulate(own, "h", runs=0, seed=0)).obstacles[0].distance > 1
+    touched = setting("cart", ("center: [2, 0]", "center: [0.5, 0]"))
+    assert proven("cart").clearance[0].verdict.value == "certified"
+    assert simulate(touched, "h", runs=0, seed=0).outcome == "falsified"

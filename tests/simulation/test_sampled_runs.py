@@ -1,0 +1,104 @@
+"""The driver of the sampled loop and the engine: against other integrators, and exact exponentials."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from loops import proven, setting
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from tubecert.simulation.attack import Attack
+from tubecert.simulation.engine import march
+from tubecert.simulation.families import course_of, courses
+from tubecert.simulation.sampled import Linear, Sampled
+
+
+class Scripted(Attack):
+    """Lanes whose noise and wind are drawn beforehand, by samples; no slow signals."""
+
+    def script(self, name, k):
+        return np.random.default_rng([k, len(name)]).uniform(-1, 1, (2, 3))
+
+    def noise(self, lanes, k):
+        return self.script("noise", k)[: len(self.setting.spec.states)]
+
+    def wind(self, lanes, k, part):
+        return self.script("wind", k)[: self.setting.nominal.E.shape[1]]
+
+
+def run(own, course=None):
+    """Three lanes, and where they are at the ends of samples, (K + 1, n, 3)."""
+    attack = Scripted(setting=own, seed=0)
+    lanes = attack.lanes(len(attack.aims), len(attack.aims) + 3)
+    if own.own is not None:
+        lanes = replace(lanes, own=np.full(3, True))
+    course = course or course_of(own)
+    coarse, fine = (Sampled(attack, lanes, course, Linear(own.result.controller, 3)) for _ in range(2))
+    fine.drawn, fine.path = np.arange(3), np.zeros((own.samples + 1, len(own.spec.states), 3))
+    march(coarse, fine, 2)
+    return fine, lanes, attack
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", ["0", "0.025", "0.05", "0.125"])
+def test_commands_act_after_their_delay_as_matrix_exponentials_say(delay):
+    """Delays of 0, a half, 1 and 2.5 samples."""
+    own = setting("cart", ("delay: 0.02", f"delay: {delay}"), ("0.2*sin(t)", "0"), duration="2")
+    found, lanes, attack = run(own)
+    Ts, tau, N = 0.05, float(delay), proven("cart").controller.N.value
+    x = lanes.start
+    commands: dict[int, np.ndarray] = {}
+    for k in range(own.samples):
+        np.testing.assert_allclose(found.path[k], x, atol=1e-12)
+        commands[k] = N @ (x + attack.noise(lanes, k))
+        ends = sorted({0.0, tau % Ts, Ts})
+        for begin, end in pairwise(ends):
+            acting = int(np.floor((k * Ts + (begin + end) / 2 - tau) / Ts))
+            push = commands.get(acting, np.zeros((1, 3))) + attack.wind(lanes, k, 0)
+            both = expm(np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0]]) * (end - begin))
+            x = (both @ np.vstack([x, push]))[:2]
+
+
+@pytest.mark.slow
+def test_a_nonlinear_plant_is_integrated_as_by_another_method():
+    """And the error that is told is not below the true one."""
+    own = setting("pendulum", duration="0.8")
+    draws = np.random.default_rng(1).random((3 * 3 + 2, 3))
+    found, lanes, attack = run(own, courses(own, own.spec.trajectory.bundle, draws))
+    course, N, Ts = found.course, proven("pendulum").controller.N.value, 0.02
+    g, commands, x = lanes.parameters[0], [np.zeros((1, 3))], course.x[0] + lanes.start
+    for k in range(own.samples):
+        plan = course.x[k * len(own.nominal.lengths)]
+        commands.append(N @ (x + attack.noise(lanes, k) - plan))
+        for late, begin, end in ((True, 0.0, 0.015), (False, 0.015, Ts)):
+            u = (course.held[k] + commands[-2] if late else course.held[k + 1] + commands[-1])[0]
+
+            def slope(t, z, u=u):
+                p, v = z.reshape(2, 3)
+                return np.concatenate([v, -g * np.sin(p) - 0.1 * v + u])
+
+            solved = solve_ivp(slope, (begin, end), x.ravel(), method="DOP853", rtol=1e-12, atol=1e-13)
+            x = solved.y[:, -1].reshape(2, 3)
+    assert abs(found.path[-1] - x).max() < min(1e-8, 2 * found.error.max() + 1e-12)
+
+
+@pytest.mark.slow
+def test_plans_of_a_family_are_members_of_it():
+    """x* in P, u* in Q with its rate, and what it misses of the dynamics within the defect; as long as they count."""
+    own = setting("pendulum", duration="4")
+    bundle, dt = own.spec.trajectory.bundle, own.nominal.lengths
+    course = courses(own, bundle, np.random.default_rng(0).random((3 * 3 + 2, 50)))
+    assert np.mean(course.ends) > 0.95 * own.samples
+    assert (abs(course.held) <= 0.3).all()
+    assert abs(np.diff(course.held, axis=0)).max() <= 1 * own.Ts * (1 + 1e-9)
+    x = course.x[:: len(own.nominal.lengths)]
+    counts = np.arange(len(x))[:, None] <= course.ends
+    assert (abs(x).max(axis=1)[counts] <= 0.2).all()
+    assert x[:, 0].max() > 0.1  # they use what there is
+    middle, step = (course.x[1:] + course.x[:-1]) / 2, np.tile(dt, own.samples)[:, None]
+    slope = (course.x[1:] - course.x[:-1]) / step[:, None]
+    assert abs(slope[:, 0] - middle[:, 1]).max() <= 0.01 + 1e-4  # p' = v up to the defect, and the chord
+    u = slope[:, 1] + np.sin(middle[:, 0]) + 0.1 * middle[:, 1]
+    assert abs(u).max() <= 0.3 + 0.01 + 1e-3
