@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from tubecert.library.reading import read
     from tubecert.library.rechecking import Rechecked, recheck
     from tubecert.library.sampled import SampledCertification
+    from tubecert.library.sampled_simulation import SampledSimulation
     from tubecert.library.simulating import simulate
     from tubecert.library.simulation import Simulation
     from tubecert.library.specification import Specification, load, specification
@@ -41,6 +42,7 @@ __all__ = [
     "Rechecked",
     "Report",
     "SampledCertification",
+    "SampledSimulation",
     "Simulation",
     "SpecError",
     "Specification",
@@ -87,6 +89,7 @@ _HOMES = {
     "Rechecked": "library.rechecking",
     "Report": "library.pages",
     "SampledCertification": "library.sampled",
+    "SampledSimulation": "library.sampled_simulation",
     "Simulation": "library.simulation",
     "Specification": "library.specification",
     "load": "library.specification",

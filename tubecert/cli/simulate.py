@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tubecert import certificate
+from tubecert.certificate.file import foreign
 from tubecert.cli import telling
 from tubecert.cli.options import Output, flag
 from tubecert.cli.presenting import present
@@ -17,6 +18,7 @@ from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode
 from tubecert.executor import Serial
 from tubecert.libraries import versions
+from tubecert.library.asked import require_nothing_of_a_metric
 from tubecert.library.simulating import (
     SimulationNumbers,
     campaign_of,
@@ -29,6 +31,7 @@ from tubecert.library.simulating import (
 from tubecert.library.workers import cluster_at
 from tubecert.printable import visible
 from tubecert.progress import Phase, Progress, Step
+from tubecert.records import Json
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -62,20 +65,22 @@ class Given:
 
 def run(given: Given, output: Output) -> ExitCode:
     """Simulate."""
-    require_extra()
     numbers = simulation_numbers(given.numbers, flag)
     radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
     settings = settings_of(given.settings, metric=given.metric, **radii)
-    chosen = controllers_of(given.controllers, flag)
     from tubecert import spec
 
     system = spec.load(given.spec, settings)
+    if system.hardware is not None:
+        return _sampled(given, system, numbers, output)
+    require_extra()
+    chosen = controllers_of(given.controllers, flag)
     if given.metric is not None:
         from tubecert.spec.metric_file import with_metric
 
         system = with_metric(system, str(given.metric))
     wishes = wishes_of(system, numbers, chosen, given.gains, given.plan)
-    folder = given.folder or f"{Path(given.spec).stem}.simulation"
+    folder = _folder(given)
     executor = Serial() if given.scheduler is None else cluster_at(given.scheduler)
     from tubecert.simulate.output import prepared, write
     from tubecert.simulate.summary import summary
@@ -93,6 +98,57 @@ def run(given: Given, output: Output) -> ExitCode:
     return _CODES.get(outcome(campaign), ExitCode.CERTIFIED)
 
 
+def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Output) -> ExitCode:
+    """The same of a sampled loop."""
+    from tubecert.library.reading import read
+    from tubecert.library.sampled import SampledCertification, certified
+    from tubecert.library.simulating import sampled_of
+    from tubecert.report import sampled_simulation
+    from tubecert.simulate.output import prepared
+    from tubecert.simulation.files import write
+
+    words = {"metric": given.metric, "scheduler": given.scheduler, "controllers": given.controllers}
+    asked = {**given.numbers, **words, "gains": given.gains, "plan": given.plan}
+    require_nothing_of_a_metric(asked, flag)
+    folder = _folder(given)
+    with prepared(folder), telling.shown(Terminal.stderr(color=output.color), output) as report:
+        found = None if given.certificate is None else read(given.certificate)
+        if found is None:
+            _tell_first(given)
+            found = certified(system, progress=report, command="tubecert simulate")
+            found.save(Path(folder) / "certificate.json")
+        if not isinstance(found, SampledCertification):
+            raise foreign(
+                str(given.certificate), "is of a loop that rests on a metric, and not of a sampled one"
+            )
+        campaign = sampled_of(found, system, numbers, given=asked, report=report, named=flag)
+        if not campaign.runs:
+            return ExitCode.INTERRUPTED
+        files = write(folder, campaign.campaign)
+    data = campaign.found
+    present(
+        output,
+        sampled_simulation.verdict_line(data),
+        lambda: sampled_simulation.report(data, folder=folder, files=files, verbose=output.verbose),
+        _json(data.to_json()) if output.json else None,
+    )
+    return _CODES.get(data.outcome, ExitCode.CERTIFIED)
+
+
+def _folder(given: Given) -> str:
+    return given.folder or f"{Path(given.spec).stem}.simulation"
+
+
+def _json(data: Json) -> str:
+    return json.dumps(data, indent=1, sort_keys=True, allow_nan=False) + "\n"
+
+
+def _tell_first(given: Given) -> None:
+    there = f"{Path(given.spec).stem}.certificate.json"
+    hint = f" (--certificate {visible(there)} takes the one that is there)" if Path(there).is_file() else ""
+    _tell(f"no certificate is given: certifying first{hint}")
+
+
 def _certificate(
     given: Given, system: Spec, numbers: SimulationNumbers, folder: str, report: Progress | None
 ) -> tuple[Spec, Certificate]:
@@ -108,9 +164,7 @@ def _certificate(
     from tubecert import pipeline
 
     options = pipeline.Options(epsilon=numbers.epsilon, rho_a=numbers.rho_a, metric=given.metric)
-    there = f"{Path(given.spec).stem}.certificate.json"
-    hint = f" (--certificate {visible(there)} takes the one that is there)" if Path(there).is_file() else ""
-    _tell(f"no certificate is given: certifying first{hint}")
+    _tell_first(given)
     result = pipeline.certify(system, options, report)
     sealed = certificate.seal(result.to_json(), {"command": "simulate", "versions": versions()})
     certificate.write(str(Path(folder) / "certificate.json"), sealed)
@@ -126,7 +180,7 @@ def _report(data: Summary, folder: str, files: int, output: Output, *, drawn: bo
         output,
         simulation.verdict_line(data),
         lambda: simulation.report(data, folder=folder, files=files, verbose=output.verbose, drawn=drawn),
-        json.dumps(data.to_json(), indent=1, sort_keys=True, allow_nan=False) + "\n" if output.json else None,
+        _json(data.to_json()) if output.json else None,
     )
 
 

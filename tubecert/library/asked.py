@@ -30,7 +30,7 @@ _SETS: Final = {
 }  # options by the keys they set
 _OF_A_METRIC: Final = (
     "rho_a", "epsilon", "metric", "conditions", "bandwidth", "adaptation_rate", "gap", "budget", "deadline",
-    "scheduler",
+    "scheduler", "controllers", "gains", "replay", "members", "replan", "plan",
 )  # fmt: skip
 Named: TypeAlias = Callable[[str], str]
 _BUDGET: Final = 2_000_000  # of a verification

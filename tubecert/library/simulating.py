@@ -15,15 +15,20 @@ from tubecert.executor import Executor, Serial
 from tubecert.expression import suggestion
 from tubecert.findings import Finding, Severity
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
-from tubecert.library.asked import Named, one_of
-from tubecert.library.certification import Certification, read
+from tubecert.library.asked import Named, one_of, require_nothing_of_a_metric
+from tubecert.library.certification import Certification
 from tubecert.library.numbers import Numbers
 from tubecert.library.plain import Number, number_texts
+from tubecert.library.reading import read
+from tubecert.library.sampled import SampledCertification
+from tubecert.library.sampled_simulation import SampledSimulation, simulated
 from tubecert.library.simulation import Simulation
 from tubecert.library.specification import File, Specifiable, spec_of
+from tubecert.library.stated import Stated
 from tubecert.printable import visible
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
+from tubecert.spec import Simulation as Section
 from tubecert.spec import Spec
 from tubecert.trajectory.make import plan_of
 
@@ -41,7 +46,7 @@ SEED: Final = 0
 
 
 def simulate(
-    result: Certification | File,
+    result: Certification | SampledCertification | File,
     *,
     spec: Specifiable | None = None,
     controllers: str | Sequence[str] | None = None,
@@ -56,14 +61,13 @@ def simulate(
     replan: Number | None = None,
     plan: File | None = None,
     progress: Progress | None = None,
-) -> Simulation:
+) -> Simulation | SampledSimulation:
     """Integrates the closed loops of a certificate, or of the file of one, and attacks the tube: `tubecert simulate`.
 
-    The arguments are the options of the command. `spec` is needed where the certificate was read and its plan is in a
-    file. Needs the extra `simulate`. Raises `TubecertError` if there is no tube that could be left, or if the
-    specification is another one.
+    The arguments are the options of the command; of a sampled loop only `runs`, `seed`, `duration` mean something.
+    `spec` is needed where the certificate was read and its plan is in a file. Needs the extra `simulate`. Raises
+    `TubecertError` if there is no tube that could be left, or if the specification is another one.
     """
-    require_extra()
     texts = number_texts(
         duration=duration,
         bandwidth=bandwidth,
@@ -75,12 +79,16 @@ def simulate(
         replan=replan,
     )
     numbers = simulation_numbers(texts, str)
+    found = result if isinstance(result, Stated) else read(result)
+    system = specification_of(found) if spec is None else spec_of(spec)
+    if isinstance(found, SampledCertification):
+        given = {"controllers": controllers, "gains": gains, "plan": plan, **texts}
+        return sampled_of(found, system, numbers, given=given, report=timed(progress), named=str)
+    require_extra()
     chosen = controllers_of(controllers, str)
     one_of("gains", gains, words_of(ADAPTIVE))
     from tubecert.simulate.certified import adopted, require_tube
 
-    found = result if isinstance(result, Certification) else read(result)
-    system = specification_of(found) if spec is None else spec_of(spec)
     wishes = wishes_of(system, numbers, chosen, gains, plan)
     require_members(system, wishes, str)
     system = adopted(system, found.result)
@@ -89,7 +97,29 @@ def simulate(
     return Simulation(campaign=campaign, compared_with=found.hash)
 
 
-def specification_of(found: Certification) -> Spec:
+def sampled_of(
+    found: SampledCertification,
+    system: Spec,
+    numbers: SimulationNumbers,
+    *,
+    given: Mapping[str, object],
+    report: Progress | None,
+    named: Named,
+) -> SampledSimulation:
+    """The same of a sampled loop; raises `SpecError` for what is `given` and means nothing there."""
+    require_nothing_of_a_metric(given, named)
+    default = system.simulation or Section()
+    return simulated(
+        found.certificate,
+        system,
+        runs=_first(numbers.runs, default.runs, RUNS),
+        seed=_first(numbers.seed, default.seed, SEED),
+        duration=numbers.duration,
+        report=report,
+    )
+
+
+def specification_of(found: Certification | SampledCertification) -> Spec:
     """What was certified; raises `SpecError` if the certificate does not say all of it."""
     try:
         return found.specification.spec
@@ -201,7 +231,6 @@ def wishes_of(
 ) -> Wishes:
     """What is simulated of a specification."""
     from tubecert.simulate.promise import KINDS
-    from tubecert.spec import Simulation as Section
 
     default = system.simulation or Section()
     option = name_of(gains or default.gains or DISTANCE.option).option

@@ -35,7 +35,7 @@ STYLES: Final = {
     "not falsified": "bold green",
     "nothing claimed": "bold",
 }
-_CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."
+CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."
 _DRAWN: Final = " and figures (PNG, SVG)"
 _NOT_DRAWN: Final = "; no figures of what was interrupted"
 _WORDS: Final = {
@@ -80,7 +80,7 @@ def report(
     data: Summary, *, folder: str, files: int, verbose: bool, drawn: bool = True
 ) -> list[RenderableType]:
     """The whole report as renderables; `folder` holds the files, figures among them if they were `drawn`."""
-    parts: list[RenderableType] = [verdict_line(data), indented(Text(_CAVEAT))]
+    parts: list[RenderableType] = [verdict_line(data), indented(Text(CAVEAT))]
     for title, body in _sections(data, verbose):
         parts += titled(title, body)
     where = Text(f"{files} files ", style="bold", no_wrap=True, overflow="ignore").append(
