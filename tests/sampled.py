@@ -1,7 +1,10 @@
-"""A certificate of a sampled loop, made by hand: what commands and pages are shown with, and no proof of anything."""
+"""Certificates of sampled loops with everything that can be shown, made by hand: no proof of anything."""
 
+import hashlib
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +25,7 @@ from tubecert.sampled_loop.record import (
     Stage,
     Tables,
 )
+from tubecert.spec import canonical, load_text
 from tubecert.verdict import Verdict
 
 SPEC = """
@@ -37,34 +41,27 @@ limits: {F: [-8, 8]}
 tube: {half_widths: {p: 0.15}}
 obstacles: [{states: [p, v], disc: {center: [0.9, 1.8], radius: 0.1}}]
 """
-EFFECTIVE = {
-    "tubecert": "1",
-    "name": "cart",
-    "system": {
-        "states": ["p", "v"],
-        "inputs": ["F"],
-        "units": {"p": "m", "v": "m/s", "F": "N"},
-        "parameters": {},
-        "f": ["v", "-v"],
-        "B": [["0"], ["1"]],
-    },
-    "safe_set": {"p": ["-1", "1"], "v": ["-2", "2"]},
-    "uncertainty": {},
-    "trajectory": {"kind": "equilibrium", "at": ["0", "0"], "input": ["0"]},
-    "initial_state": {"at": ["0.1", "0"]},
-    "tube": {"half_widths": {"p": "0.15"}},
-    "obstacles": [{"states": ["p", "v"], "disc": {"center": ["0.9", "1.8"], "radius": "0.1"}}],
-    "limits": {"F": ["-8", "8"]},
-    "hardware": {
-        "delay": "0.0005",
-        "noise": {"p": "0.001", "v": "0.002"},
-        "sample_time": "0.002",
-        "arithmetic": "double",
-        "hold": "middle",
-    },
-    "disturbance": {"E": [["0"], ["1"]], "bound": "0.05"},
-    "controller": "auto",
-}
+FAMILY = SPEC.replace(
+    "{kind: equilibrium, at: [0, 0], input: [0]}",
+    "{kind: any, x: {p: [-0.2, 0.2], v: [0, 0]}, u: {F: [-1, 1]}, input_rate: 2}",
+).replace("{at: [0.1, 0]}", "{within: 0.1}")
+DRONE = """
+tubecert: 1
+name: drone
+system:
+  states: [px, pz, phi, vx, vz, rate]
+  inputs: [left, right]
+  units: {px: m, pz: m, phi: rad, vx: m/s, vz: m/s, rate: rad/s, left: N, right: N}
+  f: [vx, vz, rate, -10*phi, 0, 0]
+  B: [[0, 0], [0, 0], [0, 0], [0, 0], [1, 1], [3, -3]]
+safe_set: {px: [-9, 9], pz: [-9, 9], phi: [-1, 1], vx: [-9, 9], vz: [-9, 9], rate: [-9, 9]}
+trajectory: {kind: equilibrium, at: [0, 0, 0, 0, 0, 0], input: [0, 0]}
+initial_state: {box: {px: [-0.1, 0.1], pz: [-0.1, 0.1], phi: [0, 0], vx: [0, 0], vz: [0, 0], rate: [0, 0]}}
+hardware: {rate: 200, delay: one sample, noise: {px: 0.005, pz: 0.005, phi: 0.005, vx: 0.02, vz: 0.02, rate: 0.02}}
+limits: {left: [-5, 5], right: [-5, 5]}
+tube: {half_widths: {px: 0.5, pz: 0.5}}
+obstacles: [{states: [px, pz], disc: {center: [5, 5], radius: 0.1}}]
+"""
 WIDE = Shares(noise=0.01, holding=0.002, uncertainty=0.0, wind=0.02, start=0.1, remainder=0.0)
 NARROW = Shares(noise=0.011, holding=0.002, uncertainty=0.0, wind=0.02, start=0.0, remainder=0.001)
 PUSH = Shares(noise=0.7, holding=0.1, uncertainty=0.0, wind=0.4, start=1.9, remainder=0.0)
@@ -74,46 +71,50 @@ def matrix(*rows: list[float]) -> HexMatrix:
     return HexMatrix(np.array(rows, dtype=float).reshape(len(rows), -1))
 
 
-def _stage(start: int, p: str, v: str, push: str) -> Stage:
-    return Stage(
-        start=start,
-        half_widths={"p": Fraction(p), "v": Fraction(v)},
-        deviations={"F": Fraction(push)},
-        memory=(Fraction("0.3"),),
+def certificate(text: str = SPEC, settings: Mapping[str, str] | None = None, **changes: Any) -> Certificate:
+    """The certificate of a specification: 0.13201 wide at the start, .034 in the long run; `changes` of its result."""
+    spec = load_text(text, "cart.yaml")
+    data, (states, inputs) = canonical(spec), (spec.states, spec.inputs)
+    stages = tuple(
+        Stage(
+            start=start,
+            half_widths=dict.fromkeys(states, Fraction(wide)),
+            deviations=dict.fromkeys(inputs, Fraction(push)),
+            memory=(Fraction("0.3"),),
+        )
+        for start, wide, push in ((0, "0.13201", "3.1"), (800, "0.034", "1.2"))
     )
-
-
-def certificate(**changes: object) -> Certificate:
-    """The certificate of the cart; `changes` are fields of its result."""
+    n, m = len(states), len(inputs)
+    ends = (Fraction("-3.1"), Fraction("3.1"))
     result = Result(
         verdict=Verdict.CERTIFIED,
         spec=Source(
-            effective=Effective.of(EFFECTIVE), effective_hash=digest(EFFECTIVE), file_hash="sha256:0"
+            effective=Effective.of(data),
+            effective_hash=digest(data),
+            file_hash=f"sha256:{hashlib.sha256(text.encode()).hexdigest()}",
+            settings=settings or {},
         ),
         claim=Claim(horizon=None, afterwards="nothing", hold="middle"),
-        controller=Tables(F=matrix([0.5]), G=matrix([1.0, 0.0]), M=matrix([-2.0]), N=matrix([-4.0, -3.0])),
-        tube=(_stage(0, "0.13201", "0.5", "3.1"), _stage(800, "0.034", "0.2", "1.2")),
-        inputs=(
-            InputUse(
-                input="F", range=(Fraction("-3.1"), Fraction("3.1")), limits=(Fraction(-8), Fraction(8))
-            ),
+        controller=Tables(
+            F=matrix([0.5]), G=matrix([1.0] * n), M=matrix(*[[-2.0]] * m), N=matrix(*[[-4.0] * n] * m)
         ),
-        clearance=(Cleared(index=1, verdict=Verdict.CERTIFIED),),
+        tube=stages,
+        inputs=tuple(InputUse(input=name, range=ends, limits=own) for name, own in spec.limits),
+        clearance=tuple(Cleared(index=i, verdict=Verdict.CERTIFIED) for i in range(len(spec.obstacles))),
     )
+    family = spec.trajectory.bundle is not None
     notes = Notes(
-        start={"p": WIDE, "v": WIDE},
-        long_run={"p": NARROW, "v": NARROW},
-        deviations={"F": PUSH},
-        samples_t=(0.0,),
-        samples_x=((0.0, 0.0),),
-        samples_u=((0.0,),),
+        start=dict.fromkeys(states, WIDE),
+        long_run=dict.fromkeys(states, NARROW),
+        deviations=dict.fromkeys(inputs, PUSH),
+        samples_t=() if family else (0.0,),
+        samples_x=() if family else ((0.0,) * n,),
+        samples_u=() if family else ((0.0,) * m,),
         evaluations=4_000,
     )
     return seal(replace(result, **changes), notes, {"command": "tubecert certify cart.yaml"})
 
 
-def undecided(*lacks: Lack) -> Certificate:
-    """The same where nothing was proven."""
-    return certificate(
-        verdict=Verdict.UNDECIDED, tube=(), inputs=(), clearance=(), controller=None, lacks=lacks
-    )
+def undecided(*lacks: Lack, **changes: Any) -> Certificate:
+    """The same where nothing is certified, though a tube was proposed."""
+    return certificate(verdict=Verdict.UNDECIDED, lacks=lacks, **changes)

@@ -12,12 +12,11 @@ from tubecert.words.sampled_loop import remedy, why
 
 def outcome(certificate: Certificate) -> Outcome:
     """The verdict, half-widths, what the inputs use of their room, and why it is not certified."""
-    result = certificate.result
+    result, notes = certificate.result, certificate.notes
+    units = result.spec.effective.system.units
+    told = ((lack.kind, why(lack, units), remedy(lack, notes)) for lack in result.lacks)
     lacks = [
-        Claim(
-            name=lack.kind, verdict=result.verdict, message=why(lack), relax=remedy(lack, certificate.notes)
-        )
-        for lack in result.lacks
+        Claim(name=kind, verdict=result.verdict, message=words, relax=help) for kind, words, help in told
     ]
     claims = tuple(lacks) or (Claim(name="sampled loop", verdict=result.verdict),)
     return Outcome(verdict=result.verdict, metric=None, numbers=tuple(_numbers(result)), claims=claims)

@@ -28,6 +28,7 @@ from tubecert.report.terminal import Terminal
 if TYPE_CHECKING:
     from tubecert.certificate.result import Result
     from tubecert.library.certification import Certification
+    from tubecert.library.sampled import SampledCertification
     from tubecert.pipeline.synthesised import Synthesised
     from tubecert.spec import Spec
 
@@ -110,22 +111,26 @@ def _sampled(given: Given, system: Spec, files: tuple[str, Sequence[str]], outpu
     if target != certificate.STDOUT:
         certificate.write_text(target, found.text)
     write_pages(pages, found.certificate)
-    page, closing = page_of(found.certificate), _closing(given.spec, target, pages, certified=found.certified)
+    page, closing = page_of(found.certificate), _closing(found, target, pages)
     data = found.text if _is_data(target, output) else None
     present(output, text.headline(page), lambda: text.screen(page, closing, verbose=output.verbose), data)
     return found.verdict.exit_code
 
 
-def _closing(spec: str, target: str, pages: Sequence[str], *, certified: bool) -> list[tuple[str, str]]:
+def _closing(found: SampledCertification, target: str, pages: Sequence[str]) -> list[tuple[str, str]]:
     """What was written, and the commands that come next."""
-    name = shlex.quote(target)
+    spec, name = found.specification.spec, shlex.quote(target)
     after = [
         ("next", f"tubecert recheck {name}"),
-        ("", f"tubecert simulate {shlex.quote(spec)} --certificate {name}"),
-        ("", f"tubecert export {name} -o {shlex.quote(Path(spec).stem)}.controller"),
-    ]
+        ("", f"tubecert simulate {shlex.quote(spec.path)} --certificate {name}"),
+        ("", f"tubecert export {name} -o {shlex.quote(spec.name)}.controller"),
+    ][: 2 if spec.controller == "none" else 3]
     more = [("more", f"-v here; tubecert report {name}: a page with figures")]
-    return [("certificate", target), *(("page", page) for page in pages), *(after if certified else more)]
+    return [
+        ("certificate", target),
+        *(("page", page) for page in pages),
+        *(after if found.certified else more),
+    ]
 
 
 def _command() -> str:

@@ -67,7 +67,12 @@ class SampledCertification(Stated):
 
         notes = self.certificate.notes
         return tuple(
-            Reason(verdict=self.verdict, claim=lack.kind, message=why(lack), relax=remedy(lack, notes))
+            Reason(
+                verdict=self.verdict,
+                claim=lack.kind,
+                message=why(lack, self.units),
+                relax=remedy(lack, notes),
+            )
             for lack in self.result.lacks
         )
 

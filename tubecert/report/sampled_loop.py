@@ -94,7 +94,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     stages = result.tube[:1] + result.tube[1:][-1:]
     filled = notes.filled if notes else {}
     when = (f"t >= {up(stage.start * period(result))} s" for stage in stages)
-    title = "half-widths" if result.verdict is Verdict.CERTIFIED else "not proven"
+    title = "tube" if result.verdict is Verdict.CERTIFIED else "not proven"
     grid = [[title, *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
     for name in (*names, *(system.inputs if notes else ())):
         widths = [up(stage.half_widths.get(name, stage.deviations.get(name))) for stage in stages]

@@ -130,9 +130,8 @@ def _name(step: Step) -> str:
     """What is worked on as reports call it: a constant by its words."""
     if step.phase is Phase.GAINS:
         return _LETTERS.get(step.name, step.name)
-    if (
-        step.phase not in _OF_CONSTANTS or step.unit is not Unit.BOXES
-    ):  # a search over boxes bounds a constant
+    bounds_a_constant = step.phase in _OF_CONSTANTS and step.unit is Unit.BOXES
+    if not bounds_a_constant:
         return step.name
     from tubecert.bounds.meanings import EVERY  # with numerics, which are there where constants are bounded
 

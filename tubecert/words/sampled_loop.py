@@ -27,16 +27,19 @@ _HELD: Final = {
     "middle": "in the middle of the interval in which it acts",
     "left": "where the interval begins in which it acts",
 }
-_WHY: Final[Mapping[Missing, str]] = {
-    "no_design": "no controller was found{mode}",
-    "no_fixed_point": "no tube closes: in {where} what is not linear grows faster than the tube",
-    "inputs": "the input {where} needs {needed} of {allowed}",
-    "safe_set": "the tube leaves the safe set: {where} needs {needed} of {allowed}",
-    "start": "the start is too far from the plan: {where} needs {needed} of {allowed}",
-    "obstacle": "the tube is not proven to keep away from obstacle {where}",
-    "undefined": "the equations are not defined everywhere in the tube ({where})",
-    "wish": "the half-width of {where} is {needed}, wished for: {allowed}",
-    "not_proven": "what was found in floats is not proven: {where} needs {needed} of {allowed}",
+_WHY: Final[Mapping[Missing, tuple[str, str]]] = {  # and what is added where it is known how much is lacking
+    "no_design": ("no controller was found", ": no input moves a mode of {where} that does not die away"),
+    "no_fixed_point": (
+        "no tube closes: what is not linear widens that of {where} ever more",
+        " (else {allowed})",
+    ),
+    "inputs": ("the input {where} has too little room", ": beside the plan it needs {needed} of {allowed}"),
+    "safe_set": ("the tube of {where} leaves the safe set", " by {needed}"),
+    "start": ("the start of {where} is too far from the plan", ": {needed} of {allowed}"),
+    "obstacle": ("the tube is not proven to keep away from obstacle {where}", ""),
+    "undefined": ("the equations are not proven to be defined in the tube: {where}", ""),
+    "wish": ("the tube of {where} is wider than wished for", ": {needed} of {allowed}"),
+    "not_proven": ("what was found in floats is not proven", ""),
 }
 _HELP: Final[Mapping[Missing, str]] = {
     "no_design": "an input or a sensor for that mode, a higher hardware.rate, or a shorter hardware.delay",
@@ -49,14 +52,14 @@ _HELP: Final[Mapping[Missing, str]] = {
     "wish": "a larger wish, or less of what fills the tube most: {largest}",
     "not_proven": "a slightly smaller start, or less noise, wind or h",
 }
-_MODE: Final = ": a mode of {where} grows by {needed} a sample, and no input moves it or no sensor sees it"
 
 
 def promise(result: Result) -> str:
     """What the verdict says, as a sentence without its subject."""
     if result.verdict is Verdict.CERTIFIED:
         return f"the state stays in the tube around {plan(result)} {extent(result)}"
-    return "; ".join(why(lack) for lack in result.lacks) or "nothing is proven"
+    units = result.spec.effective.system.units
+    return "; ".join(why(lack, units) for lack in result.lacks) or "nothing is proven"
 
 
 def plan(result: Result) -> str:
@@ -74,11 +77,13 @@ def extent(result: Result) -> str:
     return "for all t >= 0" + (f", {told} {short(last, 12)} s" if told and last is not None else "")
 
 
-def why(lack: Lack) -> str:
-    """Why nothing is certified."""
-    numbers = {name: up(getattr(lack, name), 4) for name in ("needed", "allowed")}
-    mode = _MODE.format(where=lack.where, **numbers) if lack.where else ""
-    return _WHY[lack.kind].format(where=lack.where, mode=mode, **numbers)
+def why(lack: Lack, units: Mapping[str, str]) -> str:
+    """Why nothing is certified, with numbers in the unit of what lacks."""
+    unit = units.get(lack.where, "")
+    needed, allowed = (f"{up(number)} {unit}".rstrip() for number in (lack.needed, lack.allowed))
+    sentence, more = _WHY[lack.kind]
+    text = sentence if lack.needed is None else sentence + more
+    return text.format(where=lack.where, needed=needed, allowed=allowed).removesuffix(": ")
 
 
 def remedy(lack: Lack, notes: Notes) -> str:
@@ -156,5 +161,7 @@ def _noise(told: Tree, units: Mapping[str, str]) -> str:
     """One length, or a size for each state."""
     if not isinstance(told, Mapping):
         return "0" if Fraction(told) == 0 else f"{end(Fraction(told))} (length)"
-    sizes = (f"{name} {end(Fraction(size))} {units.get(name, '')}".rstrip() for name, size in told.items())
-    return " ".join(", ".join(sizes).split())
+    alike: dict[str, list[str]] = {}
+    for name, size in told.items():
+        alike.setdefault(f"{end(Fraction(size))} {units.get(name, '')}".rstrip(), []).append(name)
+    return ", ".join(f"{', '.join(names)} {size}" for size, names in alike.items())

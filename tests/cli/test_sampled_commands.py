@@ -1,0 +1,183 @@
+"""Commands on a specification with hardware: what is proven is stood in for by hand, but for one small loop."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import sampled
+from commands import run
+
+import tubecert
+from tubecert.loop_design import certification
+from tubecert.sampled_loop.record import Lack
+
+TANK = """
+tubecert: 1
+name: tank
+system: {states: [x], inputs: [u], f: [-3*x], B: [[1]]}
+safe_set: {x: [-1, 1]}
+trajectory: {kind: equilibrium, at: [0], input: [0]}
+initial_state: {at: [0.1]}
+hardware: {rate: 1}
+controller: none
+disturbance: {E: [[1]], bound: 0.3}
+"""
+EXPECT = "expect: {verdict: certified, half_widths: {p: [0.1, 0.2], v: [0, 0.1]}, inputs: [0, 0.4]}\n"
+OF_METRICS = {
+    "conditions", "kernel", "kinds", "search", "stages", "pipeline", "metric", "synthesis", "tube", "bounds",
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("cart.yaml").write_text(sampled.SPEC)
+
+
+@pytest.fixture(autouse=True)
+def stand_in(monkeypatch):
+    """What certifies, until a test puts something else in its place."""
+
+    def certify(spec, *, settings=None, report=None, command=""):
+        lacks = [Lack(kind="inputs", where="F", needed=9.0, allowed=2.0)] if spec.limits[0][1][1] < 3 else []
+        text = spec.source.replace("rate: 500", f"rate: {1 / spec.hardware.sample_time}")
+        return sampled.undecided(*lacks) if lacks else sampled.certificate(text, settings)
+
+    monkeypatch.setattr(certification, "certify", certify)
+
+
+def test_certify_writes_and_shows():
+    done = run("certify", "cart.yaml", "--report", "cart.html")
+    assert done.exit_code == 0, done.output
+    assert done.stdout.splitlines()[-5:] == [
+        "  certificate cart.certificate.json",
+        "  page        cart.html",
+        "  next        tubecert recheck cart.certificate.json",
+        "              tubecert simulate cart.yaml --certificate cart.certificate.json",
+        "              tubecert export cart.certificate.json -o cart.controller",
+    ]
+    assert json.loads(Path("cart.certificate.json").read_text())["format"] == "tubecert-sampled-loop/1"
+    assert "<h1>cart" in Path("cart.html").read_text()
+    assert len(run("certify", "cart.yaml", "-q").stdout.splitlines()) == 1
+    assert "Assumed, not proven" in run("certify", "cart.yaml", "-v").stdout
+    for asked in (["--json"], ["-o", "-"]):
+        assert json.loads(run("certify", "cart.yaml", *asked).stdout)["result"]["verdict"] == "certified"
+
+
+def test_undecided_is_told_by_the_exit_code_and_leads_nowhere():
+    done = run("certify", "cart.yaml", "--set", "limits.F=[-2,2]")
+    assert done.exit_code == 4
+    assert done.stdout.startswith(
+        "undecided cart: the input F has too little room: beside the plan it needs 9 N of 2 N"
+    )
+    assert "tubecert recheck" not in done.stdout
+    assert "tubecert report cart.certificate.json" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "option", ["--rho-a=1", "--epsilon=1", "--gap=0.1", "--budget=9", "--conditions=B", "--metric=m.json"]
+)
+def test_what_is_about_a_metric_is_refused_where_it_stands(option):
+    done = run("certify", "cart.yaml", option)
+    name = option.partition("=")[0]
+    assert done.exit_code == 2
+    assert f"{name}: error TC112: {name} is about a certificate with a metric" in done.stderr
+    assert f"leave {name} out, or leave hardware out" in done.stderr
+    assert not Path("cart.certificate.json").exists()
+
+
+def test_all_that_is_refused_is_told_at_once():
+    done = run("certify", "cart.yaml", "--bandwidth", "1", "--adaptation-rate", "1", "--rho-a", "1")
+    assert done.stderr.count("error TC112") == 3
+
+
+def test_there_is_no_metric_to_be_found():
+    done = run("synth", "cart.yaml")
+    assert done.exit_code == 2
+    assert "cart.yaml:8:11" in done.stderr
+    assert "tubecert certify cart.yaml" in done.stderr
+
+
+def test_check_compares_with_what_is_expected():
+    Path("cart.yaml").write_text(sampled.SPEC + EXPECT)
+    done = run("check", "--certify", "--no-cache", "cart.yaml")
+    assert done.exit_code == 1
+    assert done.stdout.count("error") == 2  # and the sum of them
+    assert "TC503: half_widths.v is 0.13201, expected: [0, 0.1]" in done.stdout
+    Path("cart.yaml").write_text(sampled.SPEC + EXPECT.replace("0.1]}", "0.2]}"))
+    assert run("check", "--certify", "--no-cache", "cart.yaml").exit_code == 0
+    Path("cart.yaml").write_text(sampled.SPEC.replace("[-8, 8]", "[-2, 2]"))
+    done = run("check", "--certify", "--no-cache", "cart.yaml")
+    assert done.exit_code == 4
+    assert "TC505: undecided: inputs: the input F has too little room" in done.stdout
+
+
+def test_report_compare_and_recheck_know_it():
+    run("certify", "cart.yaml")
+    run("certify", "cart.yaml", "--set", "hardware.rate=400", "-o", "slow.json")
+    assert run("report", "cart.certificate.json", "-o", "a.md").exit_code == 0
+    assert "| p (m) | 0.1321 | 0.034 | 0.15 |" in Path("a.md").read_text()
+    told = run("compare", "cart.certificate.json", "slow.json").stdout
+    assert "half width of p" in told
+    assert "hardware.sample_time" in told
+    data = json.loads(run("compare", "cart.certificate.json", "slow.json", "--format", "json").stdout)
+    assert data["quantities"]["half_width.p"] == [0.13201, 0.13201]
+
+
+def test_a_certificate_of_another_file_is_told(monkeypatch):
+    from tubecert.cli import recheck as command
+
+    run("certify", "cart.yaml")
+    text = Path("cart.certificate.json").read_text()
+    assert command._specification("cart.yaml", text, "it") == "belongs to cart.yaml"
+    Path("cart.yaml").write_text(sampled.SPEC.replace("bound: 0.05", "bound: 0.06"))
+    with pytest.raises(
+        tubecert.SpecError, match=r"TC604: it does not belong to cart.yaml: disturbance differ"
+    ):
+        command._specification("cart.yaml", text, "it")
+
+
+def test_sweep_keeps_one_for_every_point():
+    done = run("sweep", "cart.yaml", "--over", "hardware.rate=400,500", "-o", "s")
+    assert done.exit_code == 0, done.output
+    assert "2 certified" in done.stdout
+    assert "p 0.1321, v 0.1321" in done.stdout
+    rows = Path("s/table.csv").read_text().splitlines()
+    assert "half_width.p" in rows[0]
+    assert len(rows) == 3
+    again = run("sweep", "cart.yaml", "--over", "hardware.rate=400,500", "-o", "s")
+    assert again.stdout == done.stdout
+    refused = run("sweep", "cart.yaml", "--over", "hardware.rate=400,500", "--conditions", "B", "-o", "t")
+    assert refused.exit_code == 2
+    assert "--conditions is about a certificate with a metric" in refused.stderr
+
+
+def test_the_schema_is_shown():
+    assert (
+        json.loads(run("schema", "sampled-loop").stdout)["title"] == "tubecert certificate of a sampled loop"
+    )
+
+
+@pytest.mark.slow
+def test_a_small_loop_is_certified_and_no_room_of_metrics_is_loaded():
+    """In a process of its own, from the command line to the page."""
+    Path("tank.yaml").write_text(TANK)
+    code = (
+        "import sys; from tubecert.cli.app import app\n"
+        "try: app(['certify', 'tank.yaml', '--report', 'tank.html', '--no-progress'])\n"
+        "except SystemExit as end: print('exit', end.code)\n"
+        "print(*sys.modules)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(Path(tubecert.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True, env=environment
+    )
+    said, _, modules = done.stdout.partition("exit 0")
+    assert said.startswith("certified tank: ")
+    assert "tubecert export" not in said  # there is no controller
+    loaded = {name for name in modules.split() if name.startswith("tubecert.")}
+    assert not {name for name in loaded if name.split(".")[1] in OF_METRICS}
+    assert "tubecert.certificate.result" not in loaded
