@@ -15,7 +15,7 @@ from tubecert.sampled_loop.file import of_json
 from tubecert.sampled_loop.record import FORMAT, Certificate
 
 if TYPE_CHECKING:
-    from tubecert.library.certification import Certification
+    from tubecert.library.stated import Stated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +27,7 @@ class Exported:
     work: int
 
 
-def export(result: Certification | File, folder: File) -> Exported:
+def export(result: Stated | File, folder: File) -> Exported:
     """Writes the controller of a certificate of the sampled loop, or of the file of one, into a folder.
 
     Raises `TubecertError` for a certificate that says less than `certified` or has no controller (TC710), and
@@ -46,7 +46,7 @@ def export(result: Certification | File, folder: File) -> Exported:
     return Exported(folder=target, files=tuple(sorted(files)), work=data.work)
 
 
-def _certificate(result: Certification | File) -> Certificate:
+def _certificate(result: Stated | File) -> Certificate:
     """The record of a sampled loop; raises TC710 for the certificate of a loop in continuous time."""
     found = getattr(result, "certificate", None)
     if isinstance(result, (str, os.PathLike)):

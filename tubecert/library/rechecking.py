@@ -17,9 +17,9 @@ from tubecert.recheck.run import recheck as examined
 from tubecert.report.progress import timed
 
 if TYPE_CHECKING:  # of the producer, which takes longer to import than many certificates to examine
-    from tubecert.library.certification import Certification
     from tubecert.library.plain import Number
     from tubecert.library.specification import File
+    from tubecert.library.stated import Stated
 
 WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
 
@@ -66,7 +66,7 @@ class Rechecked:
 
 
 def recheck(
-    result: Certification | File,
+    result: Stated | File,
     *,
     budget: int | None = None,
     deadline: Number | None = None,
