@@ -19,6 +19,7 @@ class Phase(StrEnum):
     CERTIFICATION = "certification"  # claims
     PLAN = "plan"  # claims: the planner works for a certification
     GAINS = "gains"  # claims
+    LOOP = "loop"  # no count: a sampled loop is designed and proven
     SYNTHESIS = "synthesis"  # no count
     VERIFICATION = "verification"  # metrics
     CHECK = "check"  # files

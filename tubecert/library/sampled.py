@@ -16,7 +16,7 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.library.specification import Specification
 from tubecert.library.stated import Stated, array, rounded_up
-from tubecert.progress import Progress
+from tubecert.progress import Phase, Progress, Step
 from tubecert.sampled_loop.file import certificate_text
 from tubecert.sampled_loop.record import Certificate, Result, Shares
 from tubecert.spec import Spec
@@ -188,6 +188,8 @@ def certified(spec: Spec, *, progress: Progress | None, command: str) -> Sampled
     """The sealed answer for a specification with `hardware`; `command` is noted as its origin."""
     from tubecert.loop_design.certification import certify
 
+    if progress is not None:
+        progress(Step(phase=Phase.LOOP))
     found = certify(spec, settings=dict(spec.settings), report=progress, command=command)
     return certification_of(found, Specification(spec=spec))
 

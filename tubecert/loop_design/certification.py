@@ -202,7 +202,7 @@ def _named(loop: Loop, error: NoDesign) -> str:
 def _told(report: Progress | None, name: str) -> Callable[[int, object], None] | None:
     if report is None:
         return None
-    return lambda count, _: report(Step(phase=Phase.CERTIFICATION, name=name, count=count, unit=Unit.STEPS))
+    return lambda count, _: report(Step(phase=Phase.LOOP, name=name, count=count, unit=Unit.STEPS))
 
 
 def _tables(question: Question, narrow: Array, report: Progress | None) -> Design:
