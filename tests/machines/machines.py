@@ -4,14 +4,16 @@ Shares nothing with the package: the plant by Runge and Kutta with delays and ho
 parts of a sample, the worst signals by their signs and, where a signal has a size and a rate, by a linear program.
 """
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise, product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, solve_discrete_are
+from scipy.linalg import expm
 from scipy.optimize import linprog
 from scipy.sparse import diags, identity, vstack
 
@@ -37,8 +39,8 @@ class Machine:
     wind: tuple[float, ...] = ()
     wind_is_length: bool = False
     wind_rate: float | None = None
-    h: float = 0.0
-    h_rate: float | None = None  # None: sudden
+    h: float = 0.0  # infinite: any size, but 0 at first
+    h_rate: float = 0.0
     bent: tuple[tuple[int, int, float], ...] = ()
     varied: tuple[int, int] | None = None
     range: tuple[float, float] = (1.0, 1.0)
@@ -80,68 +82,55 @@ class Machine:
     def text(self) -> str:
         """The specification."""
         n, m, k = self.sizes
-        factor = {self.varied: "p*"} if self.varied else {}
-        lines = ["tubecert: 1", "name: machine", "system:"]
-        lines.append(f"  states: [{', '.join(f'x{i + 1}' for i in range(n))}]")
-        lines.append(f"  inputs: [{', '.join(f'u{j + 1}' for j in range(m))}]")
+        x, u = [f"x{i + 1}" for i in range(n)], [f"u{j + 1}" for j in range(m)]
+        both = [[f"({v})" for v in row] for row in np.hstack([self.A, self.B]).tolist()]
         if self.varied:
-            lines.append(f"  parameters: {{p: [{self.range[0]}, {self.range[1]}]}}")
-        rows = [
-            " + ".join(f"{factor.get((i, j), '')}({self.A[i, j]})*x{j + 1}" for j in range(n))
-            for i in range(n)
-        ]
+            both[self.varied[0]][self.varied[1]] += "*p"
+        f = [" + ".join(f"{a}*{name}" for a, name in zip(row, x, strict=False)) for row in both]
         for i, j, c in self.bent:
-            rows[i] += f" + ({c})*x{j + 1}**3"
-        lines += ["  f:", *(f'    - "{row}"' for row in rows), "  B:"]
-        gains = [[f'"{factor.get((i, n + j), "")}({self.B[i, j]})"' for j in range(m)] for i in range(n)]
-        lines += [f"    - [{', '.join(row)}]" for row in gains]
-        lines.append(f"safe_set: {{{', '.join(f'x{i + 1}: [-60, 60]' for i in range(n))}}}")
-        if self.h:
-            rate = "" if self.h_rate is None else f", h_x: 0, h_t: {self.h_rate}"
-            lines.append(f"uncertainty: {{bounds: {{h: {self.h}{rate}}}}}")
-        if k:
-            bound = str(self.wind[0]) if self.wind_is_length else str(list(self.wind))
-            rate = "" if self.wind_rate is None else f", rate: {self.wind_rate}"
-            lines.append(f"disturbance: {{E: {self.E.tolist()}, bound: {bound}{rate}}}")
-        lines += [*self._plan(), *self._start(), *self._hardware()]
-        return "\n".join([*lines, f"controller: {self.controller}", ""])
-
-    def _plan(self) -> Iterator[str]:
-        n, m, _ = self.sizes
-        if self.wave is not None:
-            w, x, u = self.wave
-            yield f"trajectory:\n  kind: expressions\n  horizon: {self.horizon}\n  afterwards: {self.afterwards}"
-            for name, curve in (("x", x), ("u", u)):
-                terms = ", ".join(f'"({a})*sin({w}*t) + ({b})*cos({w}*t)"' for a, b in curve)
-                yield f"  {name}: [{terms}]"
-        elif self.family:
-            ranges = ", ".join(f"x{i + 1}: [-{REACH}, {REACH}]" for i in range(n))
-            inputs = ", ".join(f"u{j + 1}: [-{self.family}, {self.family}]" for j in range(m))
-            rate = "" if self.input_rate is None else f", input_rate: {self.input_rate}"
-            yield f"trajectory: {{kind: any, x: {{{ranges}}}, u: {{{inputs}}}, defect: {self.defect}{rate}}}"
-        else:
-            yield f"trajectory: {{kind: equilibrium, at: {[0] * n}, input: {[0] * m}}}"
-
-    def _start(self) -> Iterator[str]:
-        if self.kind == "ball":
-            yield f"initial_state: {{within: {self.start[0]}}}"
-        elif self.start:
-            zero = self.planned(np.zeros(1))[0][0]
-            if self.kind == "point":
-                yield f"initial_state: {{at: {[float(z + s) for z, s in zip(zero, self.start, strict=True)]}}}"
-            else:
-                ends = (
-                    f"x{i + 1}: [{z - s}, {z + s}]"
-                    for i, (z, s) in enumerate(zip(zero, self.start, strict=True))
-                )
-                yield f"initial_state: {{box: {{{', '.join(ends)}}}}}"
-
-    def _hardware(self) -> Iterator[str]:
-        noise = self.noise[0] if len(self.noise) == 1 else {f"x{i + 1}": v for i, v in enumerate(self.noise)}
-        own = f", noise: {noise}".replace("'", "") if self.noise else ""
-        yield (
-            f"hardware: {{sample_time: {float(self.sample_time)}, delay: {float(self.delay)}, hold: {self.hold}{own}}}"
+            f[i] += f" + ({c})*{x[j]}**3"
+        system = {"states": x, "inputs": u, "f": f, "B": [row[n:] for row in both]}
+        noise: object = (
+            self.noise[0] if len(self.noise) == 1 else dict(zip(x, self.noise, strict=bool(self.noise)))
         )
+        machine = {"sample_time": float(self.sample_time), "delay": float(self.delay), "hold": self.hold}
+        given: dict[str, object] = {
+            "tubecert": 1,
+            "name": "machine",
+            "system": system | ({"parameters": {"p": self.range}} if self.varied else {}),
+            "safe_set": dict.fromkeys(x, (-60, 60)),
+            "trajectory": self._plan(x, u),
+            "hardware": machine | ({"noise": noise} if self.noise else {}),
+            "controller": self.controller,
+        }
+        if self.h and np.isfinite(self.h):
+            given["uncertainty"] = {"bounds": {"h": self.h, "h_x": 0, "h_t": self.h_rate}}
+        elif self.h:  # any size, from 0 on
+            given["uncertainty"] = {"h": [f"100*{self.h_rate}*sin(t/100)"] * m}
+        if k:
+            wind = {"E": self.E.tolist(), "bound": self.wind[0] if self.wind_is_length else self.wind}
+            given["disturbance"] = wind | ({"rate": self.wind_rate} if self.wind_rate is not None else {})
+        if self.start:
+            zero, size = self.planned(np.zeros(1))[0][0], self.start
+            ends = {"point": {"at": (zero + size).tolist()}, "ball": {"within": size[0]}}
+            box = zip(x, np.stack([zero - size, zero + size], axis=1).tolist(), strict=True)
+            given["initial_state"] = ends.get(self.kind) or {"box": dict(box)}
+        return json.dumps(given)
+
+    def _plan(self, x: list[str], u: list[str]) -> dict[str, object]:
+        if self.wave is not None:
+            w, *curves = self.wave
+            texts = [[f"({a})*sin({w}*t) + ({b})*cos({w}*t)" for a, b in curve.tolist()] for curve in curves]
+            times = {"horizon": self.horizon, "afterwards": self.afterwards}
+            return {"kind": "expressions", "x": texts[0], "u": texts[1], **times}
+        if self.family:
+            boxes = {
+                "x": dict.fromkeys(x, (-REACH, REACH)),
+                "u": dict.fromkeys(u, (-self.family, self.family)),
+            }
+            rate = {} if self.input_rate is None else {"input_rate": self.input_rate}
+            return {"kind": "any", **boxes, "defect": self.defect, **rate}
+        return {"kind": "equilibrium", "at": [0] * len(x), "input": [0] * len(u)}
 
     def planned(self, t: Array) -> tuple[Array, Array]:
         """x* and u* of a wave, or of a point, at times (..)."""
@@ -153,8 +142,7 @@ class Machine:
         return basis @ x.T, basis @ u.T
 
 
-@dataclass(frozen=True, kw_only=True)
-class Tables:
+class Tables(NamedTuple):
     """delta = M zeta + N dy, zeta+ = F zeta + G dy."""
 
     F: Array
@@ -163,51 +151,13 @@ class Tables:
     N: Array
 
 
-def quadratic(machine: Machine, weight: float = 1.0) -> Tables:
-    """A linear quadratic controller that remembers what it has sent and is still under way, in single precision."""
-    A, B = machine.at(float(np.mean(machine.range)))
-    (n, m, _), ts, tau = machine.sizes, float(machine.sample_time), float(machine.delay)
-    q, rest = divmod(machine.delay, machine.sample_time)
-    late = m * (q + 1)
-    step = np.zeros((n + late, n + late))
-    into = np.zeros((n + late, m))
-    older, newer = _integral(A, B, ts) - _integral(A, B, ts - float(rest)), _integral(A, B, ts - float(rest))
-    step[:n, :n] = expm(A * ts)
-    step[:n, n + m * q :] += older
-    step[n + m :, n : n + late - m] = np.eye(late - m)
-    into[n : n + m] = np.eye(m)
-    if q:
-        step[:n, n + m * (q - 1) : n + m * q] += newer
-    else:
-        into[:n] = newer
-    cost = np.diag([*np.ones(n), *np.full(late, 1e-9)])
-    price = weight * np.eye(m) * max(ts + tau, 0.05)
-    P = solve_discrete_are(step, into, cost, price)
-    K = -np.linalg.solve(price + into.T @ P @ into, into.T @ P @ step).astype(np.float32).astype(float)
-    N, M = K[:, :n], K[:, n:]
-    shift = np.zeros((late, late))
-    shift[m:, : late - m] = np.eye(late - m)
-    F, G = shift.copy(), np.zeros((late, n))
-    F[:m], G[:m] = M, N
-    return Tables(F=F, G=G, M=M, N=N)
+def any_tables(machine: Machine, seed: int) -> Tables:
+    """A controller with two states that need not stabilise anything."""
+    rng, (n, m, _) = np.random.default_rng(seed), machine.sizes
+    return Tables(*(0.5 * rng.normal(size=size) for size in ((2, 2), (2, n), (m, 2), (m, n))))
 
 
-def nothing(machine: Machine) -> Tables:
-    """No controller."""
-    n, m, _ = machine.sizes
-    return Tables(F=np.zeros((0, 0)), G=np.zeros((0, n)), M=np.zeros((m, 0)), N=np.zeros((m, n)))
-
-
-def _integral(A: Array, B: Array, t: float) -> Array:
-    """int_0^t e^(A s) ds B."""
-    n, m = B.shape
-    whole = np.zeros((n + m, n + m))
-    whole[:n, :n], whole[:n, n:] = A, B
-    return expm(whole * t)[:n, n:]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Signals:
+class Signals(NamedTuple):
     """What an adversary does in K samples of s parts: noise (K, n), gusts (K, s, b), eta (K, s + 1, r), start."""
 
     noise: Array
@@ -216,8 +166,7 @@ class Signals:
     start: Array
 
 
-@dataclass(frozen=True, kw_only=True)
-class Run:
+class Run(NamedTuple):
     """e at the nodes, (K, s + 1, n), and delta, (K, m)."""
 
     e: Array
@@ -246,26 +195,20 @@ class Attack:
         """q."""
         return int(self.machine.delay // self.machine.sample_time)
 
-    # -- what acts ---------------------------------------------------------------------------------------------------
-
     def late(self, part: int) -> int:
         """How many commands after the newest one the actuators are in a part of a sample."""
-        before = sum(self.parts[: part + 1]) <= float(self.machine.delay % self.machine.sample_time) * (
-            1 + 1e-9
-        )
-        return self.whole + before
+        rest = float(self.machine.delay % self.machine.sample_time)
+        return self.whole + (sum(self.parts[: part + 1]) <= rest * (1 + 1e-9))
 
     @property
     def sudden(self) -> list[tuple[Array, Array, bool]]:
-        """Columns, sizes, whether one size is a length: winds without a rate, sudden h, what a family's plan misses."""
-        m, (_, B) = self.machine, self.machine.at(self.p)
+        """Columns, sizes, whether one size is a length: winds without a rate, what a family's plan misses."""
+        m, n = self.machine, len(self.machine.A)
         blocks = []
         if m.wind and m.wind_rate is None:
             blocks.append((m.E, np.array(m.wind), m.wind_is_length))
-        if m.h and m.h_rate is None:
-            blocks.append((B, np.full(B.shape[1], m.h), False))
         if m.family and m.defect:
-            blocks.append((-np.eye(len(B)), np.full(len(B), m.defect), False))
+            blocks.append((-np.eye(n), np.full(n, m.defect), False))
         return blocks
 
     @property
@@ -273,16 +216,22 @@ class Attack:
         """Column, size and rate of what moves at a rate: h, then winds."""
         m, (_, B) = self.machine, self.machine.at(self.p)
         found = []
-        if m.h and m.h_rate is not None:
+        if m.h:
             found += [(B[:, j], m.h, m.h_rate) for j in range(B.shape[1])]
         if m.wind and m.wind_rate is not None:
             # a length is spread over the components
-            share = 1 / np.sqrt(m.E.shape[1]) if m.wind_is_length else 1.0
-            sizes = np.full(m.E.shape[1], m.wind[0] * share) if m.wind_is_length else np.array(m.wind)
-            found += [(m.E[:, i], sizes[i], m.wind_rate * share) for i in range(m.E.shape[1])]
+            k = m.E.shape[1]
+            share = 1 / np.sqrt(k) if m.wind_is_length else 1.0
+            sizes = np.array(m.wind) * share * np.ones(k)
+            found += [(m.E[:, i], sizes[i], m.wind_rate * share) for i in range(k)]
         return found
 
-    # -- kernels -----------------------------------------------------------------------------------------------------
+    @property
+    def columns(self) -> tuple[Array, Array]:
+        """Those of all that is sudden, and of all that moves at a rate."""
+        none = np.zeros((len(self.machine.A), 0))
+        sudden, smooth = ([block[0] for block in blocks] for blocks in (self.sudden, self.smooth))
+        return np.hstack([none, *sudden]), np.column_stack([none, *smooth])
 
     def kernels(self) -> "Kernels":
         """Of e_i at the end of every part of a sample, and of delta, back over all samples."""
@@ -290,8 +239,7 @@ class Attack:
         n, m, t = len(A), B.shape[1], self.tables
         z, queue, r = len(t.F), m * (self.whole + 2), len(self.smooth)
         size = n + z + queue + r
-        gusts = np.hstack([np.zeros((n, 0)), *(block[0] for block in self.sudden)])
-        H = np.column_stack([np.zeros((n, 0)), *(block[0] for block in self.smooth)])
+        gusts, H = self.columns
         sample, noise = np.eye(size), np.zeros((size, n))
         sample[n : n + z] = np.hstack([t.G, t.F, np.zeros((z, queue + r))])
         sample[n + z : n + z + queue] = 0
@@ -311,12 +259,10 @@ class Attack:
         first[n * len(steps) :, n + z : n + z + m] = np.eye(m)
         return _backward(steps, sample, noise, first, self.samples)
 
-    # -- the worst signals -------------------------------------------------------------------------------------------
-
     def worst(self, kernels: "Kernels", k: int, row: int, *, sign: float = 1.0) -> tuple[float, Signals]:
         """The most that an output at sample k can be, with a sign, beside what is known, and the signals that do it."""
         lags = slice(k, None, -1)
-        n, s = len(self.machine.A), len(self.parts)
+        s = len(self.parts)
         noise, value = _largest(kernels.noise[lags, row], self._noise())
         gusts, at = np.zeros((k + 1, s, kernels.gusts.shape[-1])), 0
         for columns, sizes, length in self.sudden:
@@ -326,32 +272,23 @@ class Attack:
         eta = np.zeros((k + 1, s + 1, len(self.smooth)))
         for c, (_, most, rate) in enumerate(self.smooth):
             first = kernels.eta[k, row, c]
-            curve, more = slow(
-                kernels.rate[lags, row, :, c].ravel(), first, np.tile(self.parts, k + 1), most, rate
-            )
+            rates, lengths = kernels.rate[lags, row, :, c].ravel(), np.tile(self.parts, k + 1)
+            curve, more = slow(rates, first, lengths, most, rate)
             eta[..., c] = np.lib.stride_tricks.sliding_window_view(curve, s + 1)[::s]
             value += more
         start, more = self._start(kernels.e[k, row], sign)
-        filled = Signals(noise=sign * noise, gusts=sign * gusts, eta=sign * eta, start=start)
-        assert noise.shape == (k + 1, n)
-        return value + more, filled
+        return value + more, Signals(sign * noise, sign * gusts, sign * eta, start)
 
     def still(self, kernels: "Kernels") -> Signals:
         """Nothing that is not known: the start, if it is a point."""
         count, s, n = self.samples + 1, len(self.parts), len(self.machine.A)
-        return Signals(
-            noise=np.zeros((count, n)),
-            gusts=np.zeros((count, s, kernels.gusts.shape[-1])),
-            eta=np.zeros((count, s + 1, len(self.smooth))),
-            start=np.array(self.machine.start)
-            if self.machine.kind == "point" and self.machine.start
-            else np.zeros(n),
-        )
+        gusts, eta = np.zeros((count, s, kernels.gusts.shape[-1])), np.zeros((count, s + 1, len(self.smooth)))
+        known = self.machine.start if self.machine.kind == "point" and self.machine.start else [0.0] * n
+        return Signals(np.zeros((count, n)), gusts, eta, np.array(known))
 
     def _noise(self) -> tuple[Array, bool]:
         sizes = np.array(self.machine.noise or (0.0,))
-        n = len(self.machine.A)
-        return (np.full(n, sizes[0]), True) if len(sizes) == 1 else (sizes, False)
+        return sizes, len(sizes) == 1
 
     def _start(self, row: Array, sign: float) -> tuple[Array, float]:
         given = np.array(self.machine.start or (0.0,) * len(row))
@@ -362,15 +299,12 @@ class Attack:
         size = float(np.linalg.norm(row))
         return sign * row / (size or 1.0) * given[0], size * given[0]
 
-    # -- the loop itself ---------------------------------------------------------------------------------------------
-
     def run(self, signals: Signals, steps: int = 4) -> Run:
         """The machine with its true plant under these signals, by Runge and Kutta."""
         m, t, ts, inputs = self.machine, self.tables, float(self.machine.sample_time), self.machine.sizes[1]
         n, count = len(m.A), len(signals.noise)
-        gusts = np.hstack([np.zeros((n, 0)), *(block[0] for block in self.sudden)])
+        gusts, H = self.columns
         own = gusts.shape[1] - n * bool(m.family and m.defect)  # columns that push x; the others push x*
-        H = np.column_stack([np.zeros((n, 0)), *(block[0] for block in self.smooth)])
         middle = float(np.mean(m.range))
         x, plan = m.planned(np.zeros(1))[0][0] + signals.start, m.planned(np.zeros(1))[0][0]
         zeta, sent = np.zeros(len(t.F)), [np.zeros(inputs)] * (self.whole + 2)
@@ -420,8 +354,7 @@ class Attack:
         return self.input((left + right) / 2 if m.hold == "middle" else left, command)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Kernels:
+class Kernels(NamedTuple):
     """By lag, output (R) and part (s): of noise (L, R, n), gusts (L, R, s, b), rates (L, R, s, r); rows."""
 
     noise: Array
@@ -472,18 +405,16 @@ def slow(rates: Array, first: float, lengths: Array, most: float, rate: float) -
     count = len(cost)
     ahead = diags([np.ones(count - 1)], [1], shape=(count - 1, count)) - identity(count).tocsr()[:-1]
     limits = np.concatenate([rate * lengths] * 2)
-    done = linprog(
-        -cost, A_ub=vstack([ahead, -ahead]).tocsr(), b_ub=limits, bounds=(-most, most), method="highs"
-    )
+    both = vstack([ahead, -ahead]).tocsr()
+    ends = [(-most, most) if np.isfinite(most) else (0.0, 0.0), *[(-most, most)] * len(rates)]
+    done = linprog(-cost, A_ub=both, b_ub=limits, bounds=ends, method="highs")
     assert done.status == 0, done.message
     return np.asarray(done.x), -float(done.fun)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Met:
+class Met(NamedTuple):
     """An output at a sample: the most that any signals can do in the model, what they did, what is proven."""
 
-    p: float
     sample: int
     output: str
     limit: float
@@ -513,45 +444,31 @@ def met(
             attained = float(deltas[0] if row >= n * s else errors[0, row % n])
             name = f"u{row - n * s + 1}" if row >= n * s else f"x{row % n + 1}"
             most = attained if machine.bent else abs(known) + limit
-            found.append(
-                Met(p=p, sample=k, output=name, limit=most, attained=attained, proven=proven(k, name))
-            )
+            found.append(Met(k, name, most, attained, proven(k, name)))
     return found
 
 
-def least(
-    A: Array, B: Array, noise: Array, *, sample_time: float, delay: float, rate: float, history: int
-) -> Array:
+def least(machine: Machine, history: int) -> Array:
     """Half-widths (n,) that no controller of any kind can go below, for an h of this rate and of any size.
 
     Signals that no sample tells from none lead to the same inputs, and so do their opposites: one of both loops is off
     by as much as they move the state until the next command has acted.
     """
-    n, parts = len(A), 8
-    length = sample_time / parts
+    (n, _, _), parts, length = machine.sizes, 8, float(machine.sample_time) / 8
     flow = np.zeros((n + 2, n + 2))
-    flow[:n, :n], flow[:n, n], flow[n, n + 1] = A, B[:, 0], 1.0
+    flow[:n, :n], flow[:n, n], flow[n, n + 1] = machine.A, machine.B[:, 0], machine.h_rate
     step = expm(flow * length)
-    count = history * parts + round((sample_time + delay) / length)
+    count = history * parts + round(float(machine.sample_time + machine.delay) / length)
     reach, rows = np.zeros((n + 1, count)), [np.zeros((n, count))]
     for i in range(count):
         reach = step[: n + 1, : n + 1] @ reach
         reach[:, i] += step[: n + 1, n + 1]
         rows.append(reach[:n].copy())
     seen = np.vstack([rows[j * parts] for j in range(1, history + 1)])
-    limits = np.tile(noise, history)
-    ends = []
-    for i in range(n):
-        done = linprog(
-            -rows[-1][i],
-            A_ub=np.vstack([seen, -seen]),
-            b_ub=np.tile(limits, 2) + 1e-12,
-            bounds=(-rate, rate),
-            method="highs",
-        )
-        assert done.status == 0, done.message
-        ends.append(-float(done.fun))
-    return np.array(ends)
+    both, limits = np.vstack([seen, -seen]), np.tile(machine.noise, 2 * history) + 1e-12
+    ends = [linprog(-row, A_ub=both, b_ub=limits, bounds=(-1, 1), method="highs") for row in rows[-1]]
+    assert all(end.status == 0 for end in ends)
+    return np.array([-float(end.fun) for end in ends])
 
 
 def drawn(seed: int) -> Machine:
@@ -570,10 +487,8 @@ def drawn(seed: int) -> Machine:
     B = _decimal(rng.normal(size=(n, m)) + np.eye(n)[:, :m])
     k = int(rng.integers(0, 3))
     E = _decimal(rng.normal(size=(n, k)))
-    own: dict[str, object] = {
-        "controller": "none" if alone else "auto",
-        "hold": pick("middle", "left", "continuous"),
-    }
+    own: dict[str, object] = {"controller": "none" if alone else "auto"}
+    own |= {"hold": pick("middle", "left", "continuous")}
     if rng.random() < 0.8:
         own["noise"] = tuple(_decimal(rng.uniform(0.001, 0.02, size=pick(1, n)), 4).tolist())
     if k:
@@ -581,17 +496,15 @@ def drawn(seed: int) -> Machine:
         own |= {"wind": tuple(_decimal(rng.uniform(0.01, 0.1, size=1 if length else k)).tolist())}
         own |= {"wind_is_length": length, "wind_rate": pick(None, None, 0.2)}
     if rng.random() < 0.6:
-        own |= {"h": pick(0.05, 0.1), "h_rate": pick(None, 0.1, 0.5, 3.0)}
+        own |= {"h": pick(0.05, 0.1), "h_rate": pick(0.1, 0.5, 3.0)}
     kind = pick("rest", "rest", "wave", "family")
     if kind == "wave":
         own |= _wave(A, B, pick, rng)
     elif kind == "family" and float(np.linalg.eigvals(A).real.max()) < -0.1:
         own |= {"family": pick(0.1, 0.3), "defect": pick(0.0, 0.005), "input_rate": pick(None, 0.5)}
     if rng.random() < 0.3:
-        own |= {
-            "varied": (int(rng.integers(n)), int(rng.integers(n + m))),
-            "range": pick((0.97, 1.03), (0.9, 1.1)),
-        }
+        own |= {"varied": (int(rng.integers(n)), int(rng.integers(n + m)))}
+        own |= {"range": pick((0.97, 1.03), (0.9, 1.1))}
     if rng.random() < 0.3:
         own["bent"] = ((int(rng.integers(n)), int(rng.integers(n)), pick(-0.5, 0.3)),)
     own["kind"] = "ball" if "family" in own else pick("point", "box", "ball")

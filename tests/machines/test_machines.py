@@ -1,21 +1,81 @@
 """What an adversary attains on small machines, and what a linear program says is the limit, beside what is proven."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
-from machines import Attack, Tables, drawn, least, met, nothing, quadratic, slow
+from machines import Attack, Machine, Tables, any_tables, drawn, least, met, slow
+from tubecert.loop_design.certification import certify
+
+from tubecert.spec import load_text
+from tubecert.verdict import Verdict
 
 LINEAR = [machine for seed in range(12) if not (machine := drawn(seed)).bent]
+INTEGRATOR = (np.zeros((1, 1)), np.ones((1, 1)))
+DOUBLE = (np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]))
 
 
-def by_hand(machine) -> Tables:
-    return nothing(machine) if machine.controller == "none" else quadratic(machine)
+def one_second(plant, tau: str, noise: tuple[float, ...]) -> Machine:
+    """Samples of 1 s, |h'| <= 1."""
+    A, B = plant
+    own = {"sample_time": Fraction(1), "delay": Fraction(tau), "noise": noise, "h": np.inf, "h_rate": 1.0}
+    return Machine(A=A, B=B, E=np.zeros((len(A), 0)), **own)
+
+
+def proven(machine: Machine):
+    """Tables and what is proven of a name at a sample, and for how many samples; None if nothing is."""
+    result = certify(load_text(machine.text(), "machine.yaml")).result
+    if result.verdict is not Verdict.CERTIFIED:
+        return None
+    own = result.controller
+    tables = Tables(own.F.value, own.G.value, own.M.value, own.N.value)
+
+    def bound(k: int, name: str) -> float:
+        stage = max((each for each in result.tube if each.start <= k), key=lambda each: each.start)
+        return float({**stage.half_widths, **stage.deviations}[name])
+
+    end = result.claim.horizon
+    return tables, bound, 10**6 if end is None else int(end / machine.sample_time) - 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(60))
+def test_nothing_leaves_what_is_proven(seed):
+    machine = drawn(seed)
+    if (found := proven(machine)) is None:
+        pytest.skip("not certified")
+    tables, bound, end = found
+    for one in met(machine, tables, bound, tuple(sorted({min(k, end) for k in (0, 1, 4, 60)}))):
+        assert max(one.limit, one.attained) <= one.proven * (1 + 1e-9), one
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("machine", "low", "high", "history"),
+    [
+        (one_second(INTEGRATOR, "0", (0.1,)), 1.0, 1.4, 24),
+        (one_second(INTEGRATOR, "0.5", (1.0,)), 1.0, 1.4, 60),
+        (one_second(DOUBLE, "0", (1.0, 1.0)), 1.9, 2.5, 30),
+        (one_second(DOUBLE, "1", (1.0, 1.0)), 1.9, 2.5, 30),
+    ],
+)
+def test_linear_plants_are_near_what_any_controller_can_promise(machine, low, high, history):
+    tables, bound, _ = proven(machine)
+    names = [f"x{i + 1}" for i in range(len(machine.noise))]
+    width = np.array([bound(10**6, name) for name in names])
+    ratio = float(np.exp(np.mean(np.log(width / least(machine, history)))))
+    assert 1.0 <= ratio <= high
+    assert ratio >= low * 0.97
+    late = met(machine, tables, bound, (90,))
+    for name in names:
+        assert 0.95 <= max(one.attained / one.proven for one in late if one.output == name) <= 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("machine", LINEAR, ids=lambda machine: f"{machine.sizes}")
 def test_the_worst_signals_do_in_the_machine_what_the_kernels_say(machine):
     """Kernels by matrix exponentials, the machine by Runge and Kutta, with its queue of commands: nothing in common."""
-    for found in met(machine, by_hand(machine), lambda k, name: 1.0, (0, 3, 25)):
+    for found in met(machine, any_tables(machine, 7), lambda k, name: 1.0, (0, 3, 25)):
         assert found.attained == pytest.approx(found.limit, rel=1e-5, abs=1e-9)
 
 
@@ -34,12 +94,11 @@ def test_a_slow_signal_does_less_than_its_rate_alone_or_its_size_alone_would_all
         assert value >= 0.2 * min(0.5 * by_size, np.abs(rates) @ lengths)
 
 
-def test_what_no_controller_can_promise_is_what_a_pencil_finds_for_one_integrator():
-    """x' = u + h, |h'| <= 1, samples of 1 s: T (T + 1)/2 without noise, T = 1 + tau."""
-    A, B = np.zeros((1, 1)), np.ones((1, 1))
-    for tau in (0.0, 0.5, 1.0):
-        found = least(A, B, np.zeros(1), sample_time=1.0, delay=tau, rate=1.0, history=24)
-        assert found[0] == pytest.approx((1 + tau) * (2 + tau) / 2, rel=1e-6)
+def test_what_no_controller_can_promise_is_known_for_an_integrator():
+    """T (T + 1)/2 without noise, T = 1 + tau: a rate that no sample has shown acts until the next command does."""
+    for tau in ("0", "1/2", "1"):
+        T = 1 + float(Fraction(tau))
+        assert least(one_second(INTEGRATOR, tau, (0.0,)), 24)[0] == pytest.approx(T * (T + 1) / 2, rel=1e-6)
 
 
 def test_seeds_draw_every_kind_of_machine():
@@ -51,4 +110,4 @@ def test_seeds_draw_every_kind_of_machine():
     assert max(m.delay / m.sample_time for m in many) > 2
     grows = [max(np.linalg.eigvals(m.A).real) for m in many]
     assert sum(g > 0 for g in grows) >= 20
-    assert any(Attack(m, nothing(m), 1.0, 3).whole == 2 for m in many)
+    assert any(Attack(m, any_tables(m, 1), 1.0, 3).whole == 2 for m in many)
