@@ -47,7 +47,13 @@ def test_the_tube_as_arrays(cart):
 def test_nothing_is_handed_out_that_is_not_proven():
     found = certification_of(sampled.undecided(Lack(kind="wish", where="p", needed=0.2, allowed=0.15)))
     assert not found.certified
-    assert (found.half_widths, found.start, found.long_run, found.ranges, found.tube) == ({}, {}, {}, {}, None)
+    assert (found.half_widths, found.start, found.long_run, found.ranges, found.tube) == (
+        {},
+        {},
+        {},
+        {},
+        None,
+    )
     (reason,) = found.reasons
     assert reason.message == "the tube of p is wider than wished for: 0.2 m of 0.15 m"
     with pytest.raises(tc.TubecertError):

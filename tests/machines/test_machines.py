@@ -5,8 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from machines import Attack, Machine, Tables, any_tables, drawn, least, met, slow
-from tubecert.loop_design.certification import certify
 
+from tubecert.loop_design.certification import certify
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 
