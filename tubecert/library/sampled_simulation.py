@@ -136,7 +136,7 @@ def _require_tube(certificate: Certificate) -> None:
         return
     from tubecert.words.sampled_loop import why
 
-    reason = why(result.lacks[0]) if result.lacks else "nothing was found"
+    reason = why(result.lacks[0], result.spec.effective.system.units) if result.lacks else "nothing was found"
     message = f"there is no tube that a simulation could leave ({result.verdict}: {reason})"
     error = TubecertError([Finding(code="TC703", message=message, help="tubecert certify tells more")])
     error.exit_code = result.verdict.exit_code

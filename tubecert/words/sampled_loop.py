@@ -72,7 +72,11 @@ def extent(result: Result) -> str:
     claim, last = result.claim, result.spec.effective.trajectory.horizon
     if claim.horizon is not None:
         return f"for 0 <= t <= {short(claim.horizon, 12)} s"
-    after = {"rest": "at rest at the end of the plan after", "repeat": "which is repeated every"}
+    goes_on = result.spec.effective.trajectory.kind == "expressions"
+    after = {
+        "rest": "at rest at the end of the plan after",
+        "repeat": "along formulas that go on after" if goes_on else "which is repeated every",
+    }
     told = after.get(claim.afterwards)
     return "for all t >= 0" + (f", {told} {short(last, 12)} s" if told and last is not None else "")
 
