@@ -45,6 +45,7 @@ def tables(z: int, seed: int = 0) -> Tables:
     draw = np.random.default_rng(seed)
     sizes = {"F": (z, z), "G": (z, 2), "M": (1, z), "N": (1, 2)}
     drawn = {name: draw.uniform(-1, 1, size).astype(np.float32) for name, size in sizes.items()}
+    drawn["F"] /= np.float32(2 * z + 1)  # stable
     return Tables(**{name: HexMatrix(matrix.astype(float)) for name, matrix in drawn.items()})
 
 

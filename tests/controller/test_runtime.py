@@ -124,18 +124,34 @@ def test_where_the_input_jumps_it_is_taken_from_its_interval(afterwards, steps, 
 def test_a_bad_sample_holds_and_is_told_while_it_lasts(arithmetic):
     own = loop(lanes=3, arithmetic=arithmetic)
     [x], _ = own.data.plan.at([0])
-    good = own.step(x + 0.1)
-    kept = own.state["zeta"].copy()
     for bad in (np.nan, np.inf, -np.inf, 1e300, x[0] + own.data.reach[0] * 1.001):
-        with np.errstate(over="ignore"):
-            found = own.step(np.where([[False, False], [True, False], [False, False]], bad, x))
-        assert own.status.tolist() == [0, BAD, 0]
-        assert found[1] == good[1], "the last correction about the plan's input"
-        assert (own.state["zeta"][1] == kept[1]).all()
-    assert own.state["bad"].tolist() == [0, 5, 0]
-    own.step(x + 0.1)
-    assert own.status.tolist() == [0, 0, 0], "afterwards it goes on"
-    assert not (own.state["zeta"][1] == kept[1]).all()
+        good, kept = own.step(x + 0.1), own.state.copy()
+        assert own.status.tolist() == [0, 0, 0], "afterwards it goes on"
+        for _ in range(3 if not np.isfinite(bad) else 1):
+            with np.errstate(over="ignore"):
+                found = own.step(np.where([[False, False], [True, False], [False, False]], bad, x))
+            assert own.status.tolist() == [0, BAD, 0]
+            assert found[1] == good[1], "the last correction about the plan's input"
+            assert (own.state["zeta"][1] == kept["zeta"][1]).all()
+    assert own.state["bad"].tolist() == [0, 11, 0]
+
+
+@pytest.mark.slow
+def test_what_stays_far_away_is_no_glitch_and_steered_against():
+    """As a sample is that lies as far away, up to 64 times as far as is proven."""
+    far, edge = loop(), loop()
+    [[p, v]], _ = far.data.plan.at([0])
+    for own in (far, edge):
+        held = own.step(np.array([p, v]))
+        assert own.step(np.array([70.0, 0.1])) == held, "the first one"
+    for _ in range(3):
+        assert (
+            far.step(np.array([70.0, 0.1])) == edge.step(np.array([p + 64 * far.data.reach[0], 0.1])) != held
+        )
+        assert far.status[0] & BAD
+        assert (far.state["zeta"] == edge.state["zeta"]).all()
+    far.step(np.array([np.nan, 0]))
+    assert (far.state["zeta"] == edge.state["zeta"]).all(), "what is not finite is held, always"
 
 
 @pytest.mark.slow
@@ -209,7 +225,7 @@ int main(void) {
     if (t % 100 == 0) { y[t / 100 % NX] = odd[t / 100 % 5]; bad++; }
     const uint32_t status = controller_step(&s, y, u);
     if (!(u[0] >= -3.1001 && u[0] <= 3.3001) || (status & STATUS_BAD) != (t % 100 == 0) || s.bad != bad) return 1;
-    for (int i = 0; i < NZ; i++) if (!(fabs(s.zeta[i]) <= 0.3001)) return 2;
+    for (int i = 0; i < NZ; i++) if (!(fabs(s.zeta[i]) <= 64 * 0.3001)) return 2;
   }
   return 0;
 }

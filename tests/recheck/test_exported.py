@@ -114,9 +114,9 @@ MUTATIONS = [
     (WAVE, change(r"REACH\[NX\] = \{", "REACH[NX] = {0, ")),
     (WAVE, change(r"#endif\n$", "#endif\n#define STATUS_BAD 0\n")),
     (WAVE, change(r"(US\[STEPS\])", r"US[STEPS][NU] = {{0}};\nstatic const float \1")),
-    ({}, change(r"\(real\)xs_0", "(real)xs_1")),
-    ({}, change(r"(double us_0 = 0x1)", r"\1.8")),
-    ({}, change(r"  us\[0\] = [^;]*;\n", "")),
+    ({}, change(r"(US\[STEPS\]\[NU\] = \{\n  \{0x1)p", r"\1.8p")),
+    ({}, change(r"(XS\[STEPS\]\[NX\] = \{\n  \{)([^,]*), ([^}]*)", r"\1\3, \2")),
+    ({}, change(r"(XS\[STEPS\]\[NX\] = \{\n  \{[^}]*)\}", r"\1, 0x0p+0f}")),
     (PLANS["again"], change(r"SAMPLE_TIME \+ 0x1\.e", "SAMPLE_TIME + 0x1.d")),
     (PLANS["again"], change(r"sin\(", "cos(")),
     (PLANS["again"], change(r"pow\(([^,]*), 2", r"pow(\1, 4")),
@@ -143,7 +143,7 @@ def test_a_changed_a_missing_and_a_further_file_are_refused(name):
     assert "controller: " in examined(text, {**files, name: files[name] + b" "})
     assert "missing" in examined(text, {other: own for other, own in files.items() if other != name})
     assert "none of its files" in examined(text, {**files, f"a_{name}": files[name]})
-    removed = files["controller.c"].replace(b"status |= STATUS_BAD", b"status |= 0")
+    removed = files["controller.c"].replace(b"status = STATUS_BAD", b"status |= 0")
     assert "runtime" in examined(text, {**files, "controller.c": sealed(removed)})
 
 

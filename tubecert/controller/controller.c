@@ -1,4 +1,4 @@
-/* tubecert export, certificate any, text sha256:dc67c2fd2f9dfc58375b6680108b897857a64f08bff31384adaac26794a03cb5 */
+/* tubecert export, certificate any, text sha256:1fb9eb6c0ecd073d5b9d52b608481556a682525889f6407dc661bb20be966060 */
 /* delta = M zeta + N dy, u = us + delta, zeta' = F zeta + G dy, with dy = y - xs. Every order of these sums, with fused
    multiply-adds or without, loses at most gamma(NZ + NX + 3) of the sum of their sizes, which is proven for. */
 #define CONTROLLER_TABLES
@@ -6,6 +6,9 @@
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "compile without -ffast-math: it removes the test for what is not a number"
 #endif
+
+#define FAR 64 /* times what is proven: samples and zeta are cut off there, so that they stay finite, and no nearer: a
+                  loop that was disturbed by more than its certificate allows for has to find its way back */
 
 static real clip(real v, real low, real high) { return v >= low ? (v <= high ? v : high) : low; }
 
@@ -23,17 +26,23 @@ static void plan(uint32_t k, real xs[NX], real us[NU]) {
 #endif
 
 uint32_t controller_step(State *s, const real y[NX], PLAN_GIVEN real u[NU]) {
-  real dy[NX], zeta[NZ ? NZ : 1];
+  real dy[NX] = {0}, zeta[NZ ? NZ : 1];
+  const uint32_t lasting = s->status & STATUS_BAD;
   uint32_t status = s->k < STEPS ? 0 : STATUS_END;
+  int used = status == 0;
 #ifndef PLAN_HANDED
   real xs[NX], us[NU];
   plan(s->k, xs, us);
 #endif
-  for (int i = 0; i < NX; i++) {
+  for (int i = 0; i < NX && status != STATUS_END; i++) {
     dy[i] = y[i] - xs[i];
-    if (!(dy[i] >= -REACH[i] && dy[i] <= REACH[i]) && s->k < STEPS) status |= STATUS_BAD; /* NaN as well */
+    if (dy[i] >= -REACH[i] && dy[i] <= REACH[i]) continue;
+    status = STATUS_BAD;
+    if (lasting && dy[i] - dy[i] == 0) /* finite, and not the first: no glitch, so it is steered against */
+      dy[i] = clip(dy[i], -FAR * REACH[i], FAR * REACH[i]);
+    else
+      used = 0;
   }
-  const int used = status == 0;
   for (int j = 0; j < NU; j++) { /* the inputs first: what comes after them delays nothing */
     if (used) {
       real sum = 0;
@@ -50,7 +59,7 @@ uint32_t controller_step(State *s, const real y[NX], PLAN_GIVEN real u[NU]) {
       real sum = 0;
       for (int j = 0; j < NZ; j++) sum += F[i][j] * s->zeta[j];
       for (int j = 0; j < NX; j++) sum += G[i][j] * dy[j];
-      zeta[i] = clip(sum, -MEMORY[i], MEMORY[i]);
+      zeta[i] = clip(sum, -FAR * MEMORY[i], FAR * MEMORY[i]);
     }
     for (int i = 0; i < NZ; i++) s->zeta[i] = zeta[i];
   }

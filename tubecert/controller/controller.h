@@ -1,4 +1,4 @@
-/* tubecert export, certificate any, text sha256:00cfda2affd02f1c230af38c1339700a6644b8720649e552305f09969b4b3973 */
+/* tubecert export, certificate any, text sha256:8e926684589ca04b98472a57bf9d64287f965ce88222948ab57183349fc003f1 */
 /* The controller of a certificate of the sampled loop: C99, no memory of its own, no library but the math of a plan
    that is a formula. Once per sample, and once only: read the sensors, call controller_step, hand u to the actuators
    after the delay of the certificate. Compile without -ffast-math. One State for each of any number of loops. */
@@ -8,7 +8,7 @@
 #include <stdint.h>
 #include "controller_data.h"
 
-#define STATUS_BAD 1u     /* this sample was not used: not a number, or further from the plan than is proven */
+#define STATUS_BAD 1u     /* the sample is not finite, or further from the plan than is proven: see README.txt */
 #define STATUS_END 2u     /* the plan has ended, and what is proven with it: the last command is held */
 #define STATUS_CLIPPED 4u /* a limit acted, which it never does while the assumptions of the certificate hold */
 

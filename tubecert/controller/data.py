@@ -6,7 +6,7 @@ controller computes in, rounded to the side on which nothing that is proven is c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -17,14 +17,13 @@ import numpy as np
 
 from tubecert.controller.plans import Planned, braces, literal, planned, question, refused
 from tubecert.enclosure.interval import Array
-from tubecert.sampled_loop.record import Certificate, InputUse, Result
-from tubecert.spec import Spec
+from tubecert.sampled_loop.record import Certificate
 from tubecert.verdict import Verdict
 
 HOME: Final = Path(__file__).parent
-_ROUNDING: Final = (
-    2.0**-20
-)  # of |x*| and of the width: more than float arithmetic makes of a sample that is right
+_ROUNDING: Final = Fraction(
+    1, 2**20
+)  # of |x*| and a width: more than rounding adds to a sample that is right
 _SAMPLES: Final = 12  # of the self-test,
 _FIRST: Final = 100_000  # among so many
 
@@ -61,64 +60,47 @@ class Data:
 
 
 def data_of(certificate: Certificate) -> Data:
-    """The controller of a certificate; raises TC710 if it has none, TC711 if it does not say `certified`."""
+    """The controller of a certificate; raises TC710 if it has none, or does not say `certified`."""
     result, tables = certificate.result, certificate.result.controller
     if result.verdict is not Verdict.CERTIFIED:
-        error = refused(
-            f"the certificate says {result.verdict}, and only what is certified is exported",
-            "tubecert report says what is missing",
-        )
+        error = refused(f"the certificate says {result.verdict}", "tubecert report tells what is missing")
         error.exit_code = result.verdict.exit_code
         raise error
     if tables is None or not (tables.M.value.any() or tables.N.value.any()):
         raise refused("the certificate has no controller", "certify with `controller: auto`")
     spec = question(result)
-    assert spec.hardware is not None
-    real: type[np.floating[Any]] = np.float32 if spec.hardware.arithmetic == "single" else np.float64
+    machine, names = spec.hardware, spec.states
+    assert machine is not None
+    real: type[np.floating[Any]] = np.float32 if machine.arithmetic == "single" else np.float64
     plan = planned(result, spec, real)
+    noise = machine.noise if isinstance(machine.noise, tuple) else (machine.noise,) * len(names)
+    widths = (max(stage.half_widths[name] for stage in result.tube) for name in names)
+    sides = zip(widths, noise, map(Fraction, plan.sizes.tolist()), strict=True)
+    ranges = {use.input: use.range for use in result.inputs}
+    memory = zip(*(stage.memory for stage in result.tube), strict=True)
     return Data(
         name=spec.name,
         hash=certificate.hash,
         real=real,
-        sample_time=spec.hardware.sample_time,
-        delay=spec.hardware.delayed,
+        sample_time=machine.sample_time,
+        delay=machine.delayed,
         tables={name: getattr(tables, name).value for name in "FGMN"},
-        reach=_reach(result, spec, plan, real),
-        memory=_ends(
-            [max(own) for own in zip(*(stage.memory for stage in result.tube), strict=True)], real, -1
-        ),
-        low=_ends([own.range[0] for own in _inputs(result, spec)], real, 1),
-        high=_ends([own.range[1] for own in _inputs(result, spec)], real, -1),
+        reach=_next([w + n + _ROUNDING * (w + n + x) for w, n, x in sides], real, 1),
+        memory=_next([max(own) for own in memory], real, -1),
+        low=_next([ranges[name][0] for name in spec.inputs], real, 1),
+        high=_next([ranges[name][1] for name in spec.inputs], real, -1),
         plan=plan,
     )
 
 
-def _inputs(result: Result, spec: Spec) -> list[InputUse]:
-    own = {use.input: use for use in result.inputs}
-    return [own[name] for name in spec.inputs]
-
-
-def _reach(result: Result, spec: Spec, plan: Planned, real: type[np.floating[Any]]) -> Array:
-    """The widest half-width and the noise of each state, and what rounding may add to them."""
-    assert spec.hardware is not None
-    noise = spec.hardware.noise
-    each = noise if isinstance(noise, tuple) else (noise,) * len(spec.states)
-    widths = [max(stage.half_widths[name] for stage in result.tube) for name in spec.states]
-    more = Fraction(_ROUNDING)
-    reach = [
-        (w + own) * (1 + more) + more * Fraction(x)
-        for w, own, x in zip(widths, each, plan.sizes.tolist(), strict=True)
-    ]
-    return _ends(reach, real, 1)
-
-
-def _ends(values: list[Fraction], real: type[np.floating[Any]], side: int) -> Array:
+def _next(values: Sequence[Fraction], real: type[np.floating[Any]], side: int) -> Array:
     """Numbers of the arithmetic next to exact ones: not below them (side 1), or not above them (-1)."""
-    found = np.array([real(float(q)) for q in values], dtype=float)
-    wrong = np.array(
-        [side * Fraction(x) < side * q for x, q in zip(found.tolist(), values, strict=True)], dtype=bool
-    )
-    return np.where(wrong, np.nextafter(found.astype(real), real(side * np.inf)), found).astype(float)
+    near = [real(float(q)) for q in values]
+    own = [
+        x if side * Fraction(float(x)) >= side * q else np.nextafter(x, real(side * np.inf))
+        for x, q in zip(near, values, strict=True)
+    ]
+    return np.array(own, dtype=float)
 
 
 def header(data: Data) -> str:
@@ -135,24 +117,17 @@ def header(data: Data) -> str:
     limits = {name: braces(kind, getattr(data, name)) for name in ("reach", "memory", "low", "high")}
     tests = {name: braces(kind, own) for name, own in {"zeta": zeta, "y": y, "xs": xs, "us": us}.items()}
     tests |= {"u": braces("double", u), "next": braces("double", later)}
-    template = Template((HOME / "controller_data.h.in").read_text("utf-8"))
-    return template.substitute(
-        tables | limits | tests,
+    sizes = {"n": n, "m": m, "z": z, "tests": _SAMPLES, "steps": plan.steps, "after": plan.after}
+    places: dict[str, Any] = {**tables, **limits, **tests, **sizes}
+    return Template((HOME / "controller_data.h.in").read_text("utf-8")).substitute(
+        places,
         name=data.name,
-        real=kind,
         hash=data.hash,
-        **{
-            "n": n,
-            "m": m,
-            "z": z,
-            "steps": plan.steps,
-            "after": plan.after,
-            "kind": plan.kind,
-            "plan": plan.text,
-        },
+        real=kind,
+        kind=plan.kind,
+        plan=plan.text,
         period=literal("double", float(data.sample_time)),
         delay=literal("double", float(data.delay)),
-        tests=_SAMPLES,
         k=f"{{{', '.join(f'{k}u' for k in samples)}}}",
     )
 
@@ -160,7 +135,7 @@ def header(data: Data) -> str:
 def exact_step(
     data: Data, zeta: Array, y: Array, xs: Array, us: Array
 ) -> tuple[list[Fraction], list[Fraction]]:
-    """The inputs and the next zeta in exact arithmetic, for a sample that is within reach."""
+    """The inputs and the next zeta in exact arithmetic, for a sample within reach and a zeta within its memory."""
     dy = [Fraction(a) - Fraction(b) for a, b in zip(y.tolist(), xs.tolist(), strict=True)]
     seen = [*map(Fraction, zeta.tolist()), *dy]
 
@@ -168,9 +143,7 @@ def exact_step(
         rows = np.hstack([data.tables[left], data.tables[right]]).tolist()
         return [sum((Fraction(c) * v for c, v in zip(row, seen, strict=True)), Fraction(0)) for row in rows]
 
-    def within(values: Iterable[Fraction], low: Array, high: Array) -> list[Fraction]:
-        ends = zip(values, low.tolist(), high.tolist(), strict=True)
-        return [min(max(value, Fraction(least)), Fraction(most)) for value, least, most in ends]
-
-    u = [Fraction(a) + b for a, b in zip(us.tolist(), of("M", "N"), strict=True)]
-    return within(u, data.low, data.high), within(of("F", "G"), -data.memory, data.memory)
+    planned = zip(
+        map(Fraction, us.tolist()), of("M", "N"), data.low.tolist(), data.high.tolist(), strict=True
+    )
+    return [min(max(u + v, Fraction(a)), Fraction(b)) for u, v, a, b in planned], of("F", "G")

@@ -12,7 +12,7 @@ import os
 import re
 import secrets
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 from typing import Final
@@ -34,16 +34,11 @@ _REMEDY: Final = "choose another folder with -o FOLDER, or move that file away"
 
 def files_of(data: Data) -> dict[str, str]:
     """The text of every file, by its name."""
-    own = {name: (HOME / name).read_text("utf-8") for name in RUNTIME}
-    text = header(data)
-    return own | {
-        DATA: f"/* {_mark(data.hash, text)} */\n{text}",
-        README: f"{_mark(data.hash, about := _readme(data))}\n{about}",
-    }
-
-
-def _mark(certificate: str, text: str) -> str:
-    return f"tubecert export, certificate {certificate}, text {_digest(text.encode())}"
+    files = {name: (HOME / name).read_text("utf-8") for name in RUNTIME}
+    for name, text, line in ((DATA, header(data), "/* {} */\n"), (README, _readme(data), "{}\n")):
+        mark = f"tubecert export, certificate {data.hash}, text {_digest(text.encode())}"
+        files[name] = line.format(mark) + text
+    return files
 
 
 def _digest(text: bytes) -> str:
@@ -63,33 +58,24 @@ def write(folder: str, files: Mapping[str, str]) -> None:
     Raises `TargetError`; what stands in the folder is then as it was, or some of the files are new and none is half.
     """
     try:
-        target = Path(folder)
-        target.mkdir(exist_ok=True)
-        with _opened(target.resolve(strict=True)) as home:
-            for name in files:
-                if not _replaceable(home, name):
-                    raise OSError(0, f"{name} is there, and it is not what tubecert wrote")
+        Path(folder).mkdir(exist_ok=True)
+        home = os.open(Path(folder).resolve(strict=True), os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        try:
+            if foreign := [name for name in files if not _replaceable(home, name)]:
+                raise OSError(0, f"{foreign[0]} is there, and it is not what tubecert wrote")
             _put(home, files)
+        finally:
+            os.close(home)
     except (OSError, ValueError) as error:
-        message = (
-            f"cannot write {visible(folder)}: {(getattr(error, 'strerror', None) or str(error)).lower()}"
-        )
+        why = (getattr(error, "strerror", None) or str(error)).lower()
+        message = f"cannot write {visible(folder)}: {why}"
         raise TargetError([Finding(code="TC120", message=message, help=_REMEDY)]) from error
-
-
-@contextlib.contextmanager
-def _opened(folder: Path) -> Iterator[int]:
-    home = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
-    try:
-        yield home
-    finally:
-        os.close(home)
 
 
 def _replaceable(home: int, name: str) -> bool:
     """Whether there is no such file, or one that tubecert wrote and nobody changed."""
     try:
-        handle = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=home)
+        handle = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=home)
     except FileNotFoundError:
         return True
     with os.fdopen(handle, "rb") as file:
@@ -101,7 +87,7 @@ def _put(home: int, files: Mapping[str, str]) -> None:
     part = f".{secrets.token_hex(8)}.part"
     try:
         for name, text in files.items():
-            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
             with os.fdopen(os.open(f".{name}{part}", flags, 0o666, dir_fd=home), "wb") as file:
                 file.write(text.encode())
                 file.flush()

@@ -12,17 +12,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
 from tubecert.certificate.file import dump
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
-from tubecert.expression import FUNCTIONS, Expression
+from tubecert.expression import FUNCTIONS, Expression, symbol
 from tubecert.expression.graph import topological
 from tubecert.findings import Finding
-from tubecert.model import build
+from tubecert.model import TIME, build
 from tubecert.sampled_loop.record import Result
 from tubecert.spec import Knots, Spec, load_text
 from tubecert.trajectory.hermite import intervals
@@ -31,6 +31,7 @@ from tubecert.trajectory.plan import Plan
 
 FOR_EVER: Final = 2**30  # samples of a formula: up to there its time in double is that of the sample
 _MOST_ROWS: Final = 1_000_000
+At: TypeAlias = Callable[[Sequence[int]], tuple[Array, Array]]
 _WINDOWS: Final = 256  # of the plan, in which its size is looked for
 
 
@@ -47,7 +48,7 @@ class Planned:
     steps: int
     after: int
     sizes: Array
-    at: Callable[[Sequence[int]], tuple[Array, Array]] | None
+    at: At | None
 
 
 def refused(message: str, help: str = "") -> TubecertError:
@@ -70,42 +71,48 @@ def planned(result: Result, spec: Spec, real: type[np.floating[Any]]) -> Planned
     assert hardware is not None
     period = hardware.sample_time
     lead = hardware.delayed + (period / 2 if result.claim.hold == "middle" else 0)
-    count = FOR_EVER if horizon is None else ceil(horizon / period)
+    count = 1 if horizon is None else ceil(horizon / period)
     steps, after = (count, count) if horizon is not None and afterwards == "nothing" else (1, 0)
     if spec.trajectory.bundle is not None:
         sizes = np.array([max(map(abs, ends)) for ends in spec.trajectory.bundle.x], dtype=float)
         return Planned(kind="PLAN_HANDED", text="", steps=steps, after=after, sizes=sizes, at=None)
     plan = _plan(result, spec)
-    edges = np.linspace(0.0, float(horizon or 0), _WINDOWS + 1)
-    sizes = plan.enclose(edges[:-1], edges[1:])[0].magnitude.max(axis=0)
-    again = afterwards == "repeat"
-    written = plan.is_constant or (again and not isinstance(plan, PiecewisePlan))
+    again, known = afterwards == "repeat", isinstance(plan, PiecewisePlan)
+    formula = again and not known and not plan.is_constant
+    if formula:
+        steps = after = FOR_EVER
+    elif not plan.is_constant:
+        steps = count + (afterwards == "rest")
+        after = {"nothing": steps, "rest": steps - 1, "repeat": 0}[afterwards]
 
     def during(t: Fraction) -> Fraction:
-        if written or horizon is None:
+        if formula or horizon is None:
             return t
         return t % horizon if again else min(t, horizon)
 
     def at(samples: Sequence[int]) -> tuple[Array, Array]:
         x = _values(plan, [during(k * period) for k in samples])[0]
         u = _values(plan, [during(k * period + lead) for k in samples])[1]
-        digits = real if written else np.float32
+        digits = real if formula else np.float32
         return x.astype(digits).astype(float), u.astype(digits).astype(float)
 
-    if written:
-        steps, after = (steps, after) if plan.is_constant else (FOR_EVER, FOR_EVER)
-        text = _formula(plan, lead)
-        return Planned(kind="PLAN_FORMULA", text=text, steps=steps, after=after, sizes=sizes, at=at)
-    steps = count + (afterwards == "rest")
+    edges = np.linspace(0.0, float(horizon or 0), _WINDOWS + 1)
+    return Planned(
+        kind="PLAN_FORMULA" if formula else "PLAN_TABLE",
+        text=_formula(plan, lead) if formula else _table(steps, at),
+        steps=steps,
+        after=after,
+        sizes=plan.enclose(edges[:-1], edges[1:])[0].magnitude.max(axis=0),
+        at=at,
+    )
+
+
+def _table(steps: int, at: At) -> str:
     if steps > _MOST_ROWS:
-        raise refused(
-            f"the plan has {steps:,} samples; a table has at most {_MOST_ROWS:,}", "certify a shorter plan"
-        )
-    x, u = at(range(steps))
-    text = f"static const float XS[STEPS][NX] = {braces('float', x)};\n"
-    text += f"static const float US[STEPS][NU] = {braces('float', u)};"
-    after = {"nothing": steps, "rest": steps - 1, "repeat": 0}[afterwards]
-    return Planned(kind="PLAN_TABLE", text=text, steps=steps, after=after, sizes=sizes, at=at)
+        message = f"the plan has {steps:,} samples; a table has at most {_MOST_ROWS:,}"
+        raise refused(message, "certify a shorter plan")
+    x, u = (braces("float", own) for own in at(range(steps)))
+    return f"static const float XS[STEPS][NX] = {x};\nstatic const float US[STEPS][NU] = {u};"
 
 
 def _plan(result: Result, spec: Spec) -> Plan:
@@ -144,20 +151,16 @@ def literal(kind: str, value: float) -> str:
 
 def _formula(plan: Plan, lead: Fraction) -> str:
     """x* of the sample's time, u* of that and `lead`: a function in C, one operation a line, all in double."""
-    lines = [] if plan.is_constant else ["#include <math.h>"]
-    lines.append("static inline void plan(uint32_t k, real xs[NX], real us[NU]) {")
-    for target, roots, later in (("xs", plan.x, Fraction(0)), ("us", plan.u, lead)):
-        lines.append(
-            f"  const double t_{target} = (double)k * SAMPLE_TIME + {literal('double', float(later))};"
-        )
+    lines = ["#include <math.h>", "static inline void plan(uint32_t k, real xs[NX], real us[NU]) {"]
+    for target, roots, later in (("xs", plan.x, 0.0), ("us", plan.u, float(lead))):
+        names: dict[Expression, str] = {symbol(TIME): f"t_{target}"}
+        lines.append(f"  const double t_{target} = (double)k * SAMPLE_TIME + {literal('double', later)};")
         lines.append(f"  (void)t_{target};")
-        names: dict[Expression, str] = {}
         for node in topological(roots):
-            names[node] = f"t_{target}" if node.op == "symbol" else f"{target}_{len(names)}"
             if node.op != "symbol":
-                lines.append(
-                    f"  const double {names[node]} = {_operation(node, [names[arg] for arg in node.args])};"
-                )
+                names[node] = f"{target}_{len(names)}"
+                made = _operation(node, [names[arg] for arg in node.args])
+                lines.append(f"  const double {names[node]} = {made};")
         lines += [f"  {target}[{i}] = (real){names[root]};" for i, root in enumerate(roots)]
     return "\n".join([*lines, "}"])
 
@@ -175,5 +178,5 @@ def _operation(node: Expression, args: Sequence[str]) -> str:
         case op if op in FUNCTIONS:
             return f"{op}({args[0]})"
     raise refused(
-        f"the plan contains {node.op}, which C does not have", "give the plan as a file of knots (kind: csv)"
+        f"the plan contains {node.op}, which C does not have", "give the plan as a file (kind: csv)"
     )

@@ -181,21 +181,25 @@ class Exported:
         return side * Fraction(x) <= side * limit and (x == limit or side * limit < side * Fraction(beyond))
 
     def _selftest(self) -> str:
-        [low], [high], [memory] = (self._array(name) for name in ("low", "high", "memory"))
+        [low], [high] = self._array("low"), self._array("high")
         tables = {name: self._array(name, len(low)) for name in "FGMN"}
-        nought = [0.0] * len(memory)
         places = ("zeta", "y", "xs", "us", "u", "next")
-        samples = zip(*(self._array(name, int(self._found["tests"])) for name in places), strict=True)
-        for zeta, y, xs, us, u, later in samples:
+        samples = (self._array(name, int(self._found["tests"])) for name in places)
+        for zeta, y, xs, us, u, later in zip(*samples, strict=True):
             seen = [*map(Fraction, zeta), *(Fraction(a) - Fraction(b) for a, b in zip(y, xs, strict=True))]
-            steps = (("M", "N", us, u, low, high), ("F", "G", nought, later, [-x for x in memory], memory))
-            for left, right, base, found, least, most in steps:
-                rows = [[*a, *b] for a, b in zip(tables[left], tables[right], strict=True)][: len(found)]
-                for row, start, value, a, b in zip(rows, base, found, least, most, strict=True):
-                    own = sum((Fraction(c) * v for c, v in zip(row, seen, strict=True)), Fraction(start))
-                    if value != float(min(max(own, Fraction(a)), Fraction(b))):
-                        return "a number that it expects is another one"
+            delta = _products(tables["M"], tables["N"], seen)
+            planned = zip(us, delta, low, high, strict=True)
+            inputs = [float(min(max(Fraction(a) + d, Fraction(b)), Fraction(c))) for a, d, b, c in planned]
+            state = map(float, _products(tables["F"][: len(later)], tables["G"][: len(later)], seen))
+            if inputs != u or [*state] != later:
+                return "a number that it expects is another one"
         return ""
+
+
+def _products(left: Rows, right: Rows, seen: list[Fraction]) -> list[Fraction]:
+    """[left right] seen, exactly."""
+    rows = ((*a, *b) for a, b in zip(left, right, strict=True))
+    return [sum((Fraction(c) * v for c, v in zip(row, seen, strict=True)), Fraction(0)) for row in rows]
 
 
 def _rows(text: str, *, flat: bool = False) -> Rows:

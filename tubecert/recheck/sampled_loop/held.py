@@ -52,28 +52,23 @@ class HeldPlan:
 
     @property
     def kind(self) -> str:
-        """How it is written in C: a point is a formula, and so is what goes on as it is."""
+        """How it is written in C: what goes on as it is, is a formula."""
         course = self.course
         if course.family is not None:
             return "PLAN_HANDED"
-        goes_on = self.rests or (course.knots is None and course.spec.afterwards == "repeat")
+        goes_on = course.knots is None and course.curve.moves and course.spec.afterwards == "repeat"
         return "PLAN_FORMULA" if goes_on else "PLAN_TABLE"
-
-    @property
-    def rests(self) -> bool:
-        """Whether it is a point."""
-        return self.course.family is None and not self.course.curve.moves
 
     @property
     def counts(self) -> tuple[int, int]:
         """Samples of the plan, and which one comes after the last; the same number is the end."""
         spec = self.course.spec
         horizon, afterwards = spec.trajectory.horizon, spec.afterwards
-        count = 0 if horizon is None else ceil(horizon / spec.hardware.sample_time)
-        if self.rests or self.kind == "PLAN_HANDED":
-            return (count, count) if horizon is not None and afterwards == "nothing" else (1, 0)
+        count = 1 if horizon is None else ceil(horizon / spec.hardware.sample_time)
         if self.kind == "PLAN_FORMULA":
             return _EVER, _EVER
+        if self.kind == "PLAN_HANDED" or not self.course.curve.moves:
+            return (count, count) if horizon is not None and afterwards == "nothing" else (1, 0)
         steps = count + (afterwards == "rest")
         return steps, {"nothing": steps, "rest": steps - 1, "repeat": 0}[afterwards]
 
@@ -102,8 +97,7 @@ class HeldPlan:
         """What is wrong with the text of a plan, nothing if that is ""; and the largest |x*_i| that was seen, (n,)."""
         n = len(self.course.curve.x)
         if self.kind == "PLAN_FORMULA":
-            first = 1 if self.rests else _LOOKED_AT
-            samples = [*range(first), *(2**j - 1 for j in range(9, 31) if not self.rests)]
+            samples = [*range(_LOOKED_AT), *(2**j - 1 for j in range(9, 31))]
             found = self._evaluated(text, samples, period)
         else:
             if (rows := _ROWS.fullmatch(text)) is None:
@@ -132,8 +126,8 @@ class HeldPlan:
         known: dict[str, Term] = {}
         out: list[tuple[str, Term]] = []
         late: dict[str, float] = {}
-        lines, head = text.split("\n"), [_HEAD] if self.rests else ["#include <math.h>", _HEAD]
-        for line in lines[len(head) : -1]:
+        lines = text.split("\n")
+        for line in lines[2:-1]:
             if said := _CLOCK.fullmatch(line):
                 late[said[1]], known[said[1]] = float.fromhex(said[2]), variable(said[1])
             elif said := _LINE.fullmatch(line):
@@ -146,7 +140,7 @@ class HeldPlan:
                 return []
         n, m = len(self.course.curve.x), len(self.course.curve.u)
         order = [*(f"xs{i}" for i in range(n)), *(f"us{j}" for j in range(m))]
-        if [*lines[: len(head)], lines[-1]] != [*head, "}"] or [name for name, _ in out] != order:
+        if [*lines[:2], lines[-1]] != ["#include <math.h>", _HEAD, "}"] or [name for name, _ in out] != order:
             return []
         with ctx.workprec(53):
             program = Program([term for _, term in out], tuple(late))
