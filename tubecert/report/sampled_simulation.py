@@ -39,9 +39,11 @@ def report(data: Summary, *, folder: str, files: list[str], verbose: bool) -> li
     ]
     shown = data.violations if verbose else data.violations[:3]
     parts += [indented(Text(_violation(own), "red")) for own in shown]
-    table = plain_table("largest share of what is proven", ">adversaries", ">random runs", "at", "by")
+    late = [">in the long run"] if len(data.stages) > 1 else []
+    table = plain_table("largest share of what is proven", ">adversaries", ">random runs", *late, "at", "by")
     for name, own in (*data.states.items(), *data.inputs.items()):
-        table.add_row(name, *_shares(own))
+        long_run = [short(max(own.adversary_by_stage[-1], own.random_by_stage[-1]), 3)] if late else []
+        table.add_row(name, *_shares(own)[:2], *long_run, *_shares(own)[2:])
     parts.append(indented(table))
     for name, went in data.went.items():
         stays = (

@@ -130,7 +130,8 @@ class Attack:
         own, last = self.setting, self.setting.samples - 1
         size = max(abs(k.start).max() for k in self.kernels)
         memory = max(int(np.count_nonzero(abs(k.start).max(axis=1) > _SETTLED * size)) for k in self.kernels)
-        wanted = {0, 1, memory // 16, memory // 4, memory, last, *own.stages.tolist()}
+        doubled = (2**i for i in range(memory.bit_length()))
+        wanted = {0, memory, last, *doubled, *own.stages.tolist()}
         samples = sorted(k for k in wanted if k <= last)
         modes = [True] if own.own is not None or not own.band.matched else []
         modes += [False] if len(own.band.matched) else []
