@@ -93,7 +93,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
     stages = result.tube[:1] + result.tube[1:][-1:]
     filled = notes.filled if notes else {}
-    when = (f"t >= {up(stage.start * period(result))} s" for stage in stages)
+    when = (f"from {up(stage.start * period(result))} s" for stage in stages)
     title = "tube" if result.verdict is Verdict.CERTIFIED else "not proven"
     grid = [[title, *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
     for name in (*names, *(system.inputs if notes else ())):
