@@ -146,6 +146,9 @@ def test_a_band_that_is_not_proven_is_drawn_as_such():
         }
     assert "unproven" not in styles["certified"]
     assert "tube" not in styles["undecided"]
+    text = shown(sampled.undecided(LACKS["wish"]))
+    assert "keeps away" not in text
+    assert "of the room" not in text
 
 
 def test_the_tube_gets_narrower_where_a_stage_begins():

@@ -62,15 +62,16 @@ def figures(certificate: Certificate) -> Iterator[Figure]:
     """All of them, as far as there is something to draw."""
     result, (t, x, widths) = certificate.result, band(certificate)
     if t.size:
-        style = "tube" if result.verdict is Verdict.CERTIFIED else "unproven"
-        drawings = (*_states(certificate, t, x, widths), *_inputs(certificate, t))
+        proven = result.verdict is Verdict.CERTIFIED
+        style, told = ("tube", "proven in the loop") if proven else ("unproven", "not proven")
+        drawings = (*_states(certificate, t, x, widths, told), *_inputs(certificate, t, told))
         yield from (each.figure(style) for each in drawings)
         yield from _planes(result, x, widths)
     if certificate.notes.filled:
         yield _bars(certificate.notes.filled)
 
 
-def _states(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Drawing]:
+def _states(certificate: Certificate, t: Array, x: Array, widths: Array, told: str) -> Iterator[Drawing]:
     effective = certificate.result.spec.effective
     for i, name in enumerate(effective.system.states):
         yield Drawing(
@@ -80,22 +81,23 @@ def _states(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iter
             curve=_points(t, x[:, i]),
             band=(_points(t, x[:, i] - widths[:, i]), _points(t, x[:, i] + widths[:, i])),
             limits=_ends(effective.part("safe_set")[name]),
-            words=("safe set", "tube", "plan"),
+            words=("safe set", told, "plan"),
         )
 
 
-def _inputs(certificate: Certificate, t: Array) -> Iterator[Drawing]:
-    units, notes = certificate.result.spec.effective.system.units, certificate.notes
-    for i, use in enumerate(certificate.result.inputs):
+def _inputs(certificate: Certificate, t: Array, told: str) -> Iterator[Drawing]:
+    system, notes = certificate.result.spec.effective.system, certificate.notes
+    for use in certificate.result.inputs:
+        i = system.inputs.index(use.input)
         low, high = (_points(t, np.full(t.shape, float(end))) for end in use.range)
         yield Drawing(
             key=f"input-{i}",
             name=use.input,
-            unit=units.get(use.input, ""),
+            unit=system.units.get(use.input, ""),
             curve=_points(t, np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])),
             band=(low, high),
             limits=None if use.limits is None else _ends(use.limits),
-            words=("limits", "range in the loop", "plan"),
+            words=("limits", told, "plan"),
         )
 
 

@@ -73,7 +73,9 @@ def _screen(result: Result, notes: Notes) -> Iterator[Block]:
     yield _facts([("loop", loop(result.spec.effective)), *plans, ("start", _start(result))])
     if result.tube:
         yield _widths(result, _first(result))
-    if rows := [*_inputs(result), *_worst(result, notes), *_obstacles(result), *_lacking(result, notes)]:
+    proven = result.verdict is Verdict.CERTIFIED
+    told = (*_inputs(result), *_worst(result, notes), *_obstacles(result)) if proven else ()
+    if rows := [*told, *_lacking(result, notes)]:
         yield _facts(rows)
 
 
@@ -100,7 +102,8 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
         widths = [up(stage.half_widths.get(name, stage.deviations.get(name))) for stage in stages]
         row = [f"{name} ({system.units[name]})" if system.units.get(name) else name, *widths]
         row += [exact(wishes[name]) if name in wishes else ""] if wishes else []
-        grid.append([*row, filling(filled[name])] if filled else row)
+        row += [filling(filled[name]) if name in filled else ""] if filled else []
+        grid.append(row)
     if len(names) > _ROWS and not notes:
         grid = [[*column] for column in zip(*grid, strict=True)]
     rows = [
