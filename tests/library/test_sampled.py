@@ -12,7 +12,6 @@ import sampled
 import tubecert as tc
 from tubecert.library.sampled import certification_of
 from tubecert.loop_design import certification
-from tubecert.sampled_loop.file import certificate_text, read
 from tubecert.sampled_loop.record import Lack
 
 
@@ -88,15 +87,6 @@ def test_what_was_changed_is_refused(cart, tmp_path, tamper, code):
     path.write_text(json.dumps(data))
     with pytest.raises(tc.TargetError, match=code):
         tc.read(path)
-
-
-def test_the_file_of_a_sampled_loop_is_no_certificate_of_a_metric(cart, tmp_path):
-    from tubecert.library.certification import read as read_of_a_metric
-
-    cart.save(tmp_path / "c.json")
-    with pytest.raises(tc.TargetError, match="TC602"):
-        read_of_a_metric(tmp_path / "c.json")
-    assert certificate_text(read(cart.text, "c.json")) == cart.text
 
 
 def test_pages_and_comparisons_take_the_value(cart):

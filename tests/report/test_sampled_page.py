@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from tubecert.report import html, markdown
 from tubecert.report.sampled_loop import page_of
 from tubecert.report.terminal import Terminal
-from tubecert.report.text import headline, screen
-from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Notes, Shares
+from tubecert.report.text import screen
+from tubecert.sampled_loop.record import Claim, Cleared, InputUse, Lack, Notes, Shares
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import filling, percents, remedy, why
 
@@ -151,26 +151,6 @@ def test_a_band_that_is_not_proven_is_drawn_as_such():
     assert "of the room" not in text
 
 
-def test_the_tube_gets_narrower_where_a_stage_begins():
-    from tubecert.report.figures_sampled import band
-
-    t, x, widths = band(sampled.certificate())
-    assert t.tolist() == [0.0, 1.6, 1.6, 2.6]
-    assert widths[:, 0].tolist() == [0.13201, 0.13201, 0.034, 0.034]
-    assert not x.any()
-    assert not band(sampled.certificate(sampled.FAMILY))[0].size
-
-
-def test_names_of_a_file_are_texts_on_the_page():
-    page = page_of(sampled.certificate(sampled.SPEC.replace("m/s", "<b>m")))
-    assert "<b>m" not in html.render_page(page)
-
-
-def test_quiet_is_the_verdict():
-    line = headline(page_of(sampled.certificate())).plain
-    assert line == "certified cart: the state stays in the tube around the plan for all t >= 0"
-
-
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
@@ -180,8 +160,6 @@ def test_quiet_is_the_verdict():
     ],
 )
 def test_for_how_long(changes, told):
-    from tubecert.sampled_loop.record import Claim
-
     claim = Claim(**{"horizon": None, "afterwards": "nothing", "hold": "middle", **changes})
     text = sampled.SPEC.replace("input: [0]}", "input: [0], horizon: 5}")
     assert page_of(sampled.certificate(text, claim=claim)).summary.endswith(told)
