@@ -24,6 +24,7 @@ HOME: Final = Path(__file__).parent
 _ROUNDING: Final = Fraction(
     1, 2**20
 )  # of |x*| and a width: more than rounding adds to a sample that is right
+_FAR: Final = 64  # as in controller.c
 _SAMPLES: Final = 12  # of the self-test,
 _FIRST: Final = 100_000  # among so many
 
@@ -107,7 +108,7 @@ def header(data: Data) -> str:
     """The text of `controller_data.h`, but for its first line."""
     (n, m, z), kind, plan = data.sizes, "float" if data.real is np.float32 else "double", data.plan
     samples = np.arange(_SAMPLES) * (min(plan.steps, _FIRST) - 1) // (_SAMPLES - 1)
-    part = ((7 * np.arange(_SAMPLES)[:, None] + 5 * np.arange(n + m + z)) % 13 - 6) / 8
+    part = ((7 * np.arange(_SAMPLES)[:, None] + 5 * np.arange(n + m + z)) % 13 - 6) / 64  # no limit acts
     xs, us = (part[:, :n], part[:, n : n + m]) if plan.at is None else plan.at(samples.tolist())
     y = (xs + part[:, :n] * data.reach).astype(data.real).astype(float)
     zeta = (part[:, n + m :] * data.memory).astype(data.real).astype(float)
@@ -146,4 +147,6 @@ def exact_step(
     planned = zip(
         map(Fraction, us.tolist()), of("M", "N"), data.low.tolist(), data.high.tolist(), strict=True
     )
-    return [min(max(u + v, Fraction(a)), Fraction(b)) for u, v, a, b in planned], of("F", "G")
+    most = (_FAR * Fraction(x) for x in data.memory.tolist())
+    later = [min(max(v, -x), x) for v, x in zip(of("F", "G"), most, strict=True)]
+    return [min(max(u + v, Fraction(a)), Fraction(b)) for u, v, a, b in planned], later
