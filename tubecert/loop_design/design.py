@@ -157,7 +157,7 @@ class _Search:
         n = len(self.plant.A)
         wished = np.isfinite(self.plant.wishes)
         self.sizes = W * (UNASKED if wished.any() else 1.0)
-        self.sizes[:n][wished] = WISH * self.plant.wishes[wished]
+        self.sizes.reshape(-1, n)[:, wished] = WISH * self.plant.wishes[wished]
         grown = response.gain @ (rest_at(self.plant, W[:n], U) - self.constant)
         return bool(wished.any() or (grown > 1e-4 * response.ever).any())
 

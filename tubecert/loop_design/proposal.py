@@ -24,7 +24,7 @@ _FORGOTTEN: Final = 1e-4  # what is left of the oldest sample that counts
 _FEWEST: Final = 8
 _PARTS: Final = (2, 4, 8, 16)
 _SETTLED: Final = 5e-3  # finer pieces that gain less are not worth it
-_STEPS: Final = 60
+_STEPS: Final = 200
 _LARGE: Final = 1e6
 _STEADY: Final = 0.9  # a long run that is not narrower than this of the tube is no stage of its own
 _STAGES: Final = (32, 8, 3, 1)
@@ -139,20 +139,36 @@ def _fixed_point(inequalities: Inequalities, boxes: Boxes, report: Report | None
                 report(step, found.W[-1])
             if not np.isfinite(found.W).all() or (widest < found.W).any():
                 raise NoTubeError(found.W[0])
-            pairs = ((found.W, boxes.W), (found.U, boxes.U), (found.Z, boxes.Z))
-            settled = all((np.abs(new - old) <= 1e-4 * new + 1e-300).all() for new, old in pairs)
-            if settled:
-                return found
+            if _within(found, boxes, 1 + 1e-4) and _within(boxes, found, 1 + 1e-4):
+                return _kept(inequalities, found)
             boxes = found
     raise NoTubeError(boxes.W[0])
 
 
+def _kept(inequalities: Inequalities, boxes: Boxes) -> Boxes:
+    """Boxes a little wider, which the inequalities map inside themselves; what is quadratic grows most."""
+    wider = Boxes(*(_WIDER * own + 1e-30 for own in (boxes.W, boxes.U, boxes.Z)))
+    for _ in range(_STEPS):
+        found = inequalities.of(wider)
+        if _within(found, wider, 1 - 1e-5):
+            return wider
+        pairs = ((wider.W, found.W), (wider.U, found.U), (wider.Z, found.Z))
+        wider = Boxes(*(np.maximum(old, (1 + 1e-4) * new) for old, new in pairs))
+    raise NoTubeError(wider.W[0])
+
+
+def _within(inner: Boxes, outer: Boxes, share: float) -> bool:
+    """Whether boxes lie in a share of others."""
+    pairs = ((inner.W, outer.W), (inner.U, outer.U), (inner.Z, outer.Z))
+    return all(bool((a <= share * b).all()) for a, b in pairs)
+
+
 def _stages(loop: Loop, boxes: Boxes, starts: Sequence[int]) -> tuple[Stage, ...]:
-    """A thousandth wider, as decimals; what is later feeds on what is before, and has to be wider than that."""
+    """As decimals; what is later feeds on what is before, and has to be wider by more than that was rounded."""
 
     def rounded(values: Array, stage: int) -> list[Fraction]:
-        wider = _WIDER * (1 + 1e-5) ** stage
-        return [Fraction(up(float(value) * wider + 1e-30, _DIGITS)) for value in values]
+        wider = (1 + 2e-6) ** (stage + 1)
+        return [Fraction(up(float(value) * wider, _DIGITS)) for value in values]
 
     model = loop.model
     return tuple(
