@@ -558,19 +558,23 @@ metric = tc.synthesise(spec, rate=1)
 run = tc.simulate(result, runs=3)
 page = tc.report(result)
 page.save(Path("x.html"))
+assert isinstance(result, tc.Certification) and isinstance(run, tc.Simulation)  # else there is a computer in the loop
 omega: float | None = result.omega
 width: float = result.half_widths["x"]
 x: float = result.curve("B")[0, 0]
 ok: bool = tc.recheck(result).confirmed and tc.verify(spec, metric).proven
 axes = result.plot_tube()
 axes.plot(run.states("l1")[:, 0])
+loop = tc.read("loop.json")
+assert isinstance(loop, tc.SampledCertification)
+u: float = loop.controller()(0.0, [0.1, 0.2])[0]
 """
 WRONG = """
 import tubecert as tc
 tc.certfy("plant.yaml")
 tc.certify("plant.yaml", rho="0.1")
 tc.simulate(3)
-omega: str = tc.read("x.json").omega
+hash: int = tc.read("x.json").hash
 """
 
 
