@@ -1,5 +1,6 @@
 """The certificate of a sampled loop on a terminal and as a page: short, rounded outward, never more than is proven."""
 
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import asdict
 from fractions import Fraction
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tubecert.report import html, markdown
+from tubecert.report import pages as explained
 from tubecert.report.sampled_loop import page_of
 from tubecert.report.terminal import Terminal
 from tubecert.report.text import screen
@@ -84,6 +86,15 @@ def test_the_screen_says_what_is_proven():
     assert "p* in [-0.2, 0.2], v* in [0, 0], F* in [-1, 1]; |F*'| <= 2" in shown(
         sampled.certificate(sampled.FAMILY)
     )
+
+
+@pytest.mark.parametrize("text", [sampled.SPEC, sampled.FAMILY], ids=["cart", "family"])
+def test_explain_knows_every_label(text):
+    lines = shown(sampled.certificate(text)).splitlines()[1:-4]
+    labels = {match[1] for line in lines if (match := re.match(r"  ([a-z]+)(?: [a-z])?  ", line))}
+    assert {"loop", "start", "tube", "fills", "obstacles"} <= labels
+    causes = {cause.rsplit(" ", 2)[0] for cause in filling(sampled.WIDE).split(", ")}
+    assert not [word for word in {*labels, *causes, "wish", "room"} if explained.find(word) is None]
 
 
 def test_an_obstacle_that_is_not_cleared_is_not_told_as_one_that_is():
