@@ -89,8 +89,13 @@ def test_what_was_changed_is_refused(cart, tmp_path, tamper, code):
         tc.read(path)
 
 
-def test_pages_and_comparisons_take_the_value(cart):
+def test_pages_and_comparisons_take_the_value(cart, tmp_path):
     assert "0.1321" in tc.report(cart).markdown
+    folder = tmp_path / "cart.simulation"
+    folder.mkdir()
+    (folder / "summary.json").write_text(json.dumps({"outcome": "not falsified", "certificate": cart.hash}))
+    (folder / "tube_use.svg").write_text("<svg/>")
+    assert "data:image/svg" in tc.report(cart, simulation=folder).html
     both = tc.compare(cart, cart)
     assert both.quantities["half_width_in_the_long_run.p"] == (Fraction("0.034"),) * 2
     assert not both.differences

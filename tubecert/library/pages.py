@@ -73,7 +73,7 @@ class Report:
         if isinstance(self.certificate, SampledCertificate):
             from tubecert.report.sampled_loop import page_of
 
-            return page_of(self.certificate)
+            return page_of(self.certificate, self.simulated)
         from tubecert.report import page_sections
 
         return page_sections.page_of(self.certificate, self.simulated)

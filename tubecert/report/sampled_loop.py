@@ -13,6 +13,7 @@ from tubecert.digits import down, exact, up
 from tubecert.report.claimed import NOT_RECHECKED, started
 from tubecert.report.figures_sampled import figures, period
 from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Section, Table, Tile
+from tubecert.report.page_simulation import Simulated, simulated_blocks
 from tubecert.sampled_loop.record import Certificate, Notes, Result
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import assumed, extent, family, filling, loop, plan, promise, remedy
@@ -21,7 +22,7 @@ _MOST, _ROWS = 6, 4  # states of the first screen; where there are more than fou
 _TILES: Final = 4
 
 
-def page_of(certificate: Certificate) -> Page:
+def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Page:
     """The page of a certificate, whatever its verdict."""
     result, notes = certificate.result, certificate.notes
     units, drawn = result.spec.effective.system.units, tuple(figures(certificate))
@@ -30,6 +31,7 @@ def page_of(certificate: Certificate) -> Page:
         "loop": ("The loop", [*_screen(result, notes)]),
         "figures": ("Figures", [Figures(figures=drawn)] if drawn else []),
         "tube": ("Half-widths, and what fills them", table),
+        "simulation": ("Simulation", [] if simulated is None else [*simulated_blocks(simulated)]),
         "assumed": ("Assumed, not proven", [Items(items=tuple(assumed(result)))]),
         "origin": ("Where it comes from", [_origin(certificate)]),
     }
