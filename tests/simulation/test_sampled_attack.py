@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 from tubecert.sampled_loop.record import HexMatrix
 from tubecert.simulation import campaign
-from tubecert.simulation.attack import Attack
+from tubecert.simulation.attack import Attack, worst_of
 from tubecert.simulation.campaign import simulate, summary
 from tubecert.simulation.kernels import goals
 
@@ -45,6 +45,19 @@ def test_a_loop_without_remainders_is_driven_to_its_edge_and_not_beyond(name):
         assert 0.95 < own.adversary.share <= 1
         assert own.adversary_by_stage[-1] > 0.93
         assert own.random.share <= 1
+
+
+@pytest.mark.slow
+def test_signals_and_starts_keep_to_their_bounds_however_small_kernels_are():
+    """A long run forgets its start to 1e-170, whose squares are no numbers."""
+    np.testing.assert_allclose(worst_of(np.array([[3e-170, -4e-170]]), True), [[0.6, -0.8]])
+    attack = Attack(setting=setting("pendulum", duration="3"), seed=0)
+    lanes = attack.lanes(0, len(attack.aims) + 20)
+    starts = np.linalg.norm(lanes.start, axis=0)
+    assert starts[lanes.aimed] == pytest.approx(0.02, rel=1e-12)
+    assert starts.max() <= 0.02 * (1 + 1e-12)
+    for k in (0, 1, 149):
+        assert np.linalg.norm(attack.noise(lanes, k), axis=0).max() <= 0.0005 * (1 + 1e-12)
 
 
 def sabotaged(how):

@@ -113,8 +113,8 @@ class Attack:
             for k in self.kernels
         ]
         raw = (
-            _unit(np.stack([k.noise for k in self.kernels]), own.loop.noise.length),
-            _unit(np.stack([k.wind for k in self.kernels]), own.gusts.length),
+            worst_of(np.stack([k.noise for k in self.kernels]), own.loop.noise.length),
+            worst_of(np.stack([k.wind for k in self.kernels]), own.gusts.length),
             np.stack(aims),
             np.stack([k.start for k in self.kernels]),
         )
@@ -198,7 +198,7 @@ class Attack:
         worst = table[index, np.minimum(sample, table.shape[1] - 1)].T * sign
         worst = np.where(aimed & (abs(worst).max(axis=0) > 0), worst, 2 * part[:-1] - 1)
         inside = np.where(aimed | (part[-1] < 0.5), 1.0, part[-1])
-        around = _ball(worst, own.length) if own.length else np.sign(worst) * own.box[:, None]
+        around = worst_of(worst.T, own.length > 0).T * (own.length or own.box[:, None])
         return np.asarray(own.known.mid + inside * around)
 
     def noise(self, lanes: Lanes, k: int) -> Array:
@@ -233,17 +233,14 @@ class Attack:
         return lanes.draws[:, sum(self._sizes) :].T
 
 
-def _ball(direction: Array, radius: float) -> Array:
-    length = np.sqrt((direction**2).sum(axis=0))
-    return np.asarray(radius * direction / np.where(length > 0, length, 1.0))
-
-
-def _unit(table: Array, ball: bool) -> Array:
-    """The worst signals (.., c) for kernels (.., c): signs, or directions."""
-    if not ball:
+def worst_of(table: Array, ball: bool) -> Array:
+    """The worst signals (.., c) for kernels (.., c), however small these are: signs, or directions."""
+    if not ball or not table.shape[-1]:
         return np.sign(table)
-    length = np.sqrt((table**2).sum(axis=-1, keepdims=True))
-    return np.asarray(table / np.where(length > 0, length, 1.0))
+    largest = abs(table).max(axis=-1, keepdims=True)
+    scaled = table / np.where(largest > 0, largest, 1.0)
+    length = np.sqrt((scaled**2).sum(axis=-1, keepdims=True))
+    return np.asarray(scaled / np.where(length > 0, length, 1.0))
 
 
 def _within(raw: Array, bound: Size) -> Array:
