@@ -187,11 +187,11 @@ def _overrides(node: Node, effective: Node) -> Overrides:
         adaptation_rate=own.get("adaptation_rate", Node.decimal),
         conditions=own.get("conditions", lambda item: item.word(*DECIDES)),
         metric=own.get("metric", Node.text),
-        settings=own.get("settings", lambda item: _settings(item, effective)) or {},
+        settings=own.get("settings", lambda item: read_settings(item, effective)) or {},
     )
 
 
-def _settings(node: Node, effective: Node) -> dict[str, tuple[Fraction, Fraction]]:
+def read_settings(node: Node, effective: Node) -> dict[str, tuple[Fraction, Fraction]]:
     """What was set and is a number, where the specification has one; other texts are no more than told."""
     found = {}
     for path, item in node.items():

@@ -98,7 +98,7 @@ class _Test:
         if not self._apart((x, x), (y, y), exact(0)):
             return False
         middle = (_fraction(x), _fraction(y))
-        return self._obstacle.radius is not None or not _contains(self._obstacle.corners, middle)
+        return self._obstacle.radius is not None or not contains(self._obstacle.corners, middle)
 
     def along(self, whole: Segment, budget: int) -> Outcome:
         """The least distance is kept over a segment, halved where that is needed."""
@@ -159,7 +159,7 @@ def _tops(obstacle: Obstacle) -> Iterator[list[Fraction]]:
         yield [max(c * a[0] + s * a[1], c * b[0] + s * b[1]) for c, s in _turned()]
 
 
-def _contains(corners: Sequence[Point], point: Point) -> bool:
+def contains(corners: Sequence[Point], point: Point) -> bool:
     """Whether a polygon contains a point that is on none of its edges: how often a ray crosses them."""
     x, y = point
     crossed = 0

@@ -21,8 +21,10 @@ from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.spelling import LONGEST, spelled
 
 FORMAT = "tubecert-certificate/3"
+SAMPLED_LOOP = "tubecert-sampled-loop/1"
 MOST_BYTES = 64_000_000
-_VERSIONED = re.compile(r"tubecert-certificate/(\d+)")
+_KNOWN = {form.rpartition("/")[0]: form for form in (FORMAT, SAMPLED_LOOP)}
+_VERSIONED = re.compile(rf"({'|'.join(_KNOWN)})/(\d+)")
 _DEEPEST = 60
 _LEAST, _MOST = Fraction(1, 10**300), Fraction(10**300)
 _MOST_FLOAT = 1e300  # whose shortest decimal is _MOST
@@ -261,12 +263,13 @@ def read(text: str, file: str) -> Node:
         raise wrong(
             "TC601", f"{file} is not a certificate of tubecert", "give a file that `tubecert certify` wrote"
         )
-    if known != FORMAT:
-        newer = int(match[1][:9]) > int(FORMAT.rpartition("/")[2])
+    own = _KNOWN[match[1]]
+    if known != own:
+        newer = int(match[2][:9]) > int(own.rpartition("/")[2])
         told = "a newer" if newer else "an older"
         remedy = "use a newer tubecert" if newer else "certify again"
         message = (
-            f"{file} was written by {told} version: its format is {known[:60]}, this version reads {FORMAT}"
+            f"{file} was written by {told} version: its format is {known[:60]}, this version reads {own}"
         )
         raise wrong("TC602", message, remedy)
     return Node(data, "certificate")

@@ -13,10 +13,13 @@ from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.claims import of_certified, of_every
 from tubecert.recheck.clock import telling, time_is_up, within
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import read
+from tubecert.recheck.document import SAMPLED_LOOP, Node, read
 from tubecert.recheck.examination import Claim, Memory
 from tubecert.recheck.metric import stated
 from tubecert.recheck.result import Certificate
+from tubecert.recheck.sampled_loop import claims as sampled_loop
+from tubecert.recheck.sampled_loop.record import NOT_EXAMINED
+from tubecert.recheck.sampled_loop.record import read_certificate as read_sampled_loop
 
 BUDGET = 200_000
 Report = Callable[[str, int, int, int, float], None]
@@ -85,11 +88,11 @@ def recheck(
     `memory` keeps outcomes between certificates; `to_first_failure` leaves the rest alone once a claim has failed. What
     is not proven after so many `seconds` is undecided, and nothing of that is kept. `heard` hears each outcome.
     """
-    certificate = read_certificate(read(text, file))
+    stated_verdict, stated_hash, unread, of = _read(read(text, file), budget)
     found: list[Examined] = []
     kept = memory if seconds is None else None
     with within(seconds):
-        claims = tuple(_claims(certificate, budget))
+        claims = tuple(of())
         for claim in claims:
             told = None if report is None else partial(report, claim.name, len(found), len(claims))
             if told is not None:
@@ -101,11 +104,21 @@ def recheck(
             if to_first_failure and not found[-1].outcome.holds:
                 break
     return Recheck(
-        stated=certificate.result.verdict,
-        hash=certificate.stated_hash,
+        stated=stated_verdict,
+        hash=stated_hash,
         claims=tuple(found),
-        unread=(*certificate.unread, *_refuted_beside(certificate)),
+        unread=unread,
     )
+
+
+def _read(document: Node, budget: int) -> tuple[str, str, tuple[str, ...], Callable[[], Iterator[Claim]]]:
+    """What a certificate of either format states, its hash, what is not examined, and its claims."""
+    if document.mapping()["format"] == SAMPLED_LOOP:
+        own = read_sampled_loop(document)
+        return own.result.verdict, own.stated_hash, NOT_EXAMINED, lambda: sampled_loop.of(own, budget)
+    certificate = read_certificate(document)
+    unread = (*certificate.unread, *_refuted_beside(certificate))
+    return certificate.result.verdict, certificate.stated_hash, unread, lambda: _claims(certificate, budget)
 
 
 def _refuted_beside(certificate: Certificate) -> Iterator[str]:

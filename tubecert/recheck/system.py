@@ -194,7 +194,7 @@ def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
     if isinstance(trajectory, Expressed):
         return expressed(trajectory.x, trajectory.u, TIME, trajectory.horizon)
     return hermite(
-        _knots(plan, trajectory.between, trajectory.horizon),
+        knots_of(plan, trajectory.between, trajectory.horizon),
         [row[0] for row in s.drift],
         s.states,
         s.inputs,
@@ -202,7 +202,7 @@ def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
     )
 
 
-def _knots(plan: Plan, between: str, horizon: Fraction) -> Knots:
+def knots_of(plan: Plan, between: str, horizon: Fraction) -> Knots:
     """Knots that span the horizon, in order, filled as the specification says."""
     path, knots = "certificate.result.plan", plan.knots
     if knots is None:

@@ -1,0 +1,13 @@
+"""Re-verification of a certificate of a sampled loop: no metric; its error equation summed again on balls.
+
+In: a document of its format. Out: claims, as of every certificate. Trusted: yes; nothing of the producer is imported.
+
+| module | what it does |
+|---|---|
+| `record` | the certificate, read into closed types |
+| `windows`, `remainders` | the plan in windows; suprema on the tube |
+| `exponential`, `loop` | e^(A t), and the matrices of the loop |
+| `rows` | rows carried back lag by lag, kernels, sums |
+| `conditions` | the inequalities at every sample |
+| `obstacles`, `claims` | what else is claimed; all claims in their order |
+"""
