@@ -11,6 +11,7 @@ half-width or of an input's deviation that was attained, and that the program sa
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import time
 from collections import Counter
@@ -26,6 +27,15 @@ from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 
 SAMPLES = (0, 1, 4, 60)
+PATIENCE = 120  # s for one machine
+
+
+class SlowError(Exception):
+    """A machine took too long."""
+
+
+def _give_up(*_: object) -> None:
+    raise SlowError
 
 
 def main() -> None:
@@ -34,20 +44,26 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=1000)
     asked = parser.parse_args()
+    signal.signal(signal.SIGALRM, _give_up)
     met_by: Counter[str] = Counter()
     largest = 0.0
     for seed in range(asked.first, asked.first + asked.count):
         started = time.process_time()
         machine = drawn(seed)
-        result = certify(load_text(machine.text(), f"machine_{seed}.yaml")).result
-        word = result.verdict.value
-        if result.verdict is Verdict.CERTIFIED:
-            limit, attained = _shares(seed, result)
-            largest = max(largest, limit, attained)
-            word += " LEFT" if max(limit, attained) > 1 + 1e-9 else ""
-            told = f"limit {limit:.4f} attained {attained:.4f} stages {len(result.tube)}"
+        signal.alarm(PATIENCE)
+        try:
+            result = certify(load_text(machine.text(), f"machine_{seed}.yaml")).result
+            shares = _shares(seed, result) if result.verdict is Verdict.CERTIFIED else ()
+        except SlowError:
+            word, told = "slow", f"more than {PATIENCE} s"
         else:
-            told = " ".join(f"{lack.kind} {lack.where}" for lack in result.lacks)
+            word, told = result.verdict.value, " ".join(f"{lack.kind} {lack.where}" for lack in result.lacks)
+            if shares:
+                largest = max(largest, *shares)
+                word += " LEFT" if max(shares) > 1 + 1e-9 else ""
+                told = f"limit {shares[0]:.4f} attained {shares[1]:.4f} stages {len(result.tube)}"
+        finally:
+            signal.alarm(0)
         met_by[word] += 1
         print(f"{seed:5} {machine.sizes} {word:12} {told}  {time.process_time() - started:.1f} s", flush=True)
     print(f"{dict(met_by)}; the largest share {largest:.6f}")

@@ -4,7 +4,8 @@
     python benchmarks/sampled_loop.py orbit --runs 100   rows whose name contains a word; runs of simulate
 
 Beside every half-width stands what a search in floats, with remainders bounded by hand, had found before there was a
-proof: one tube for ever where nothing else is said. The ratio is that of the widest state. Times are CPU seconds, of
+proof: one tube for ever where nothing else is said. The ratio is the geometric mean (that of
+the widest state). Times are CPU seconds, of
 whole commands but for `proof`, which is the inequalities alone; the memory is the peak of certify.
 """
 
@@ -20,6 +21,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import geometric_mean
 from typing import Any
 
 from tubecert.loop_design.certification import ask
@@ -52,17 +54,17 @@ class Case:
 
     name: str
     file: str
-    floats: tuple[float | None, ...]
+    floats: tuple[float, ...]
     later: tuple[float, ...] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
 
 
-def _moving(name: str, floats: tuple[float | None, ...], **settings: str) -> Case:
+def _moving(name: str, floats: tuple[float, ...], **settings: str) -> Case:
     own = {key.replace("__", "."): value for key, value in settings.items()}
     return Case(name=f"pvtol_moving {name}", file="pvtol_moving", floats=floats, settings=own)
 
 
-def _orbit(name: str, floats: tuple[float | None, ...], settings: Mapping[str, str]) -> Case:
+def _orbit(name: str, floats: tuple[float, ...], settings: Mapping[str, str]) -> Case:
     return Case(name=f"orbit {name}", file="orbit", floats=floats, settings=settings)
 
 
@@ -214,17 +216,17 @@ def _row(case: Case, folder: Path, runs: int) -> list[str]:
 
 
 def _ratios(case: Case, first: list[Any], last: list[Any]) -> str:
-    """The largest ratio to the floats, of the first stage and of the last one."""
+    """The ratio to the floats, of the first stage and of the last one: geometric mean, and that of the widest state."""
     pairs = [(first, case.floats), (last, case.later)] if case.later else [(first, case.floats)]
-    found = [
-        max(float(own) / before for own, before in zip(widths, floats, strict=False) if before)
-        for widths, floats in pairs
-    ]
-    return ", ".join(f"{ratio:.2f}" for ratio in found)
+    texts = []
+    for widths, floats in pairs:
+        ratios = [float(own) / before for own, before in zip(widths, floats, strict=False)]
+        texts.append(f"{geometric_mean(ratios):.2f} ({max(ratios):.2f})")
+    return ", ".join(texts)
 
 
 def _numbers(values: Any) -> str:
-    return " ".join("-" if value is None else f"{float(value):.2g}" for value in values)
+    return " ".join(f"{float(value):.2g}" for value in values)
 
 
 def _inputs(result: Mapping[str, Any]) -> str:

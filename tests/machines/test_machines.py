@@ -1,16 +1,18 @@
 """What an adversary attains on small machines, and what a linear program says is the limit, beside what is proven."""
 
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from machines import Attack, Machine, Tables, any_tables, drawn, least, met, slow
 
 from tubecert.loop_design.certification import certify
-from tubecert.spec import load_text
+from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 
 LINEAR = [machine for seed in range(12) if not (machine := drawn(seed)).bent]
+QUESTIONS = sorted((Path(__file__).parent / "questions").glob("*.yaml"))
 INTEGRATOR = (np.zeros((1, 1)), np.ones((1, 1)))
 DOUBLE = (np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]))
 
@@ -47,6 +49,17 @@ def test_nothing_leaves_what_is_proven(seed):
     tables, bound, end = found
     for one in met(machine, tables, bound, tuple(sorted({min(k, end) for k in (0, 1, 4, 60)}))):
         assert max(one.limit, one.attained) <= one.proven * (1 + 1e-9), one
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", QUESTIONS, ids=lambda path: path.stem)
+def test_what_a_new_user_asks_is_answered(path):
+    result = certify(load(str(path))).result
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.claim.horizon is None
+    widths = dict(result.tube[-1].half_widths)
+    if path.stem == "stable":  # x' = -3 x + w, |w| <= .1: w/3
+        assert 1 / 30 < widths["x"] < 0.04
 
 
 @pytest.mark.slow
