@@ -4,9 +4,8 @@
     python benchmarks/sampled_loop.py orbit --runs 100   rows whose name contains a word; runs of simulate
 
 Beside every half-width stands what a search in floats, with remainders bounded by hand, had found before there was a
-proof: one tube for ever where nothing else is said. The ratio is the geometric mean (that of
-the widest state). Times are CPU seconds, of
-whole commands but for `proof`, which is the inequalities alone; the memory is the peak of certify.
+proof: one tube for ever where nothing else is said. The ratio is the geometric mean (that of the widest state). Times are
+CPU seconds, of whole commands but for `proof`, which is the inequalities alone; the memory is the peak of certify.
 """
 
 from __future__ import annotations
