@@ -4,8 +4,8 @@
     python benchmarks/sampled_loop.py orbit --runs 100   rows whose name contains a word; runs of simulate
 
 Beside every half-width stands what a search in floats, with remainders bounded by hand, had found before there was a
-proof: one tube for ever where nothing else is said. The ratio is the geometric mean (that of the widest state). Times are
-CPU seconds, of whole commands but for `proof`, which is the inequalities alone; the memory is the peak of certify.
+proof: one tube for ever where nothing else is said. The ratio is the geometric mean (that of the widest state). Times
+are CPU seconds, of whole commands but for `proof`, which is the inequalities alone; the memory is the peak of certify.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tubecert.loop_design.certification import ask
 from tubecert.sampled_loop.file import read
 from tubecert.sampled_loop.setting import Controller
 from tubecert.sampled_loop.theorem import check
-from tubecert.spec import load
+from tubecert.spec import Spec, load
 from tubecert.spec.override import Setting
 
 CONFIGS = Path(__file__).parent.parent / "configs"
@@ -184,7 +184,8 @@ def _row(case: Case, folder: Path, runs: int) -> list[str]:
             f"{certified.seconds:.1f}",
             *[""] * 4,
         ]
-    first, last = (list(result["tube"][i]["half_widths"].values()) for i in (0, -1))
+    question = load(spec, [Setting(path=path, text=text) for path, text in case.settings.items()])
+    first, last = ([result["tube"][i]["half_widths"][name] for name in question.states] for i in (0, -1))
     checked = _command("recheck", certificate, "-q")
     played = _command(
         "simulate",
@@ -207,7 +208,7 @@ def _row(case: Case, folder: Path, runs: int) -> list[str]:
         _ratios(case, first, last),
         _inputs(result),
         f"{certified.seconds:.1f}",
-        f"{_proof(spec, case.settings, certificate):.2f}",
+        f"{_proof(question, certificate):.2f}",
         f"{checked.seconds:.1f}",
         f"{certified.memory:.0f}",
         ", ".join("yes" if done.code == 0 else f"exit {done.code}" for done in (checked, played, exported)),
@@ -239,12 +240,12 @@ def _inputs(result: Mapping[str, Any]) -> str:
     return ", ".join(texts)
 
 
-def _proof(spec: str, settings: Mapping[str, str], certificate: str) -> float:
+def _proof(question: Spec, certificate: str) -> float:
     """CPU seconds of the inequalities alone, for the stages and the recipe of a certificate."""
     own = read(Path(certificate).read_text("utf-8"), certificate).result
     assert own.controller is not None
     assert own.recipe is not None
-    loop = ask(load(spec, [Setting(path=path, text=text) for path, text in settings.items()])).loop
+    loop = ask(question).loop
     tables = Controller.of(own.controller)
     started = time.process_time()
     assert check(loop, tables, own.tube, own.recipe).verdict is own.verdict

@@ -2,7 +2,7 @@
 
 In: a plant and tables. Out: `Response`, and W, U as the least fixed point with the remainder. Without one the sums are
 what the worst signals attain, up to quadrature and to what happens between the nodes of a sample.
-Implements: (D.8) and (D.9') of docs/theory-sampled-loop.md, in floats. Trusted: no.
+Implements: theory of the sampled loop, sections 3 and 5, in floats. Trusted: no.
 """
 
 from __future__ import annotations

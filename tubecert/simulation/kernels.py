@@ -1,7 +1,7 @@
 """The loop without remainders, lag by lag: what each signal does to a state, or to an input, some samples later.
 
 xi = (e, zeta, v_1 .. v_{q+1}): errors, the controller's memory, what the inputs still to act add to the plan's.
-Implements: theory of the sampled loop, rows r_i = c AA^i, in floats. Trusted: no.
+Implements: theory of the sampled loop, section 3, rows r_i = c AA^i, in floats. Trusted: no.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class Linear:
         self.memory = np.zeros((len(tables.F.value), lanes))
 
     def step(self, y: Array, x: Array, u: Array) -> Array:
-        """Implements: delta = M zeta + N dy, zeta+ = F zeta + G dy."""
+        """Implements: theory of the sampled loop, section 1: delta = M zeta + N dy, zeta+ = F zeta + G dy."""
         own, dy = self.tables, y - x
         delta = own.M.value @ self.memory + own.N.value @ dy
         self.memory = own.F.value @ self.memory + own.G.value @ dy

@@ -1,7 +1,8 @@
 """The plan as exported code has it: x* at every sample, u* as it is held while that sample's command acts.
 
-Implements: command k acts over [k Ts + delay, (k + 1) Ts + delay); u* is that of its middle, or of its beginning. A
-time beyond the end of a finite plan is its end; one that is repeated begins again, or goes on where it is a formula.
+Implements: theory of the sampled loop, section 1. Command k acts over [k Ts + delay, (k + 1) Ts + delay); u* is that of
+its middle, or of its beginning. A time beyond the end of a finite plan is its end; one that is repeated begins again,
+or goes on where it is a formula.
 """
 
 from __future__ import annotations
