@@ -17,16 +17,10 @@ from tubecert.loop_design import unfound
 from tubecert.loop_design.observer import Observer, in_units, observe, rounded, units_of
 from tubecert.loop_design.plant import Plant
 from tubecert.loop_design.unfound import NoDesign
-from tubecert.loop_design.widths import Response, respond, rest_at, sample_of, settle, split
+from tubecert.loop_design.widths import Response, respond, rest_at, sample_of, settle, sizes
 
-SWEEPS = (
-    (10.0, False),
-    (3.0, False),
-    (3.0, True),
-    (1.7, True),
-    (1.7, True),
-    (1.3, True),
-)  # factor; single weights?
+COARSE = (10.0, 3.0)  # factors on groups of weights
+FINE = (3.0, 1.7, 3.0, 1.7, 1.3)  # on groups and on single weights
 GAIN = 1e-3  # what a step must gain
 STEPS = 8  # of the fixed point in a search
 SEARCHED, SUMMED = 3000, 20_000  # lags in a search, and at the end
@@ -61,10 +55,11 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
     Raises `NoDesign` where a mode cannot be moved or held, or where the best loop found needs more input than there
     is, or has no tube.
     """
+    unfound.refuse_inputs(plant, np.full_like(plant.room, 1e-300))
     units = units_of(plant)
     observer = observe(in_units(plant, units))
     unfound.refuse_unmoved(observer.plant)
-    unfound.refuse_too_strong(plant)
+    unfound.refuse_unheld(plant)
     search = _Search(observer, report or (lambda evaluations, value: None))
     weights = search.run(search.within())
     if search.refer(weights):
@@ -77,23 +72,19 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
     return Design(F=F, G=G, M=M, N=N, W=W, U=U, evaluations=search.evaluations)
 
 
-def _nothing(plant: Plant) -> tuple[Array, Array]:
-    return np.zeros(len(plant.A)), np.zeros(len(plant.room))
-
-
 def _tube(plant: Plant, theta: Array) -> tuple[Array, Array]:
     """W, U of rounded tables by the fixed point, followed to its end; or `NoDesign`."""
+    n, m = plant.B.shape
     if (response := respond(plant, sample_of(plant), theta, SUMMED)) is None:
         raise NoDesign("no_design")
-    rows = response.ever + response.gain @ rest_at(plant, *_nothing(plant))
-    alone, U = split(plant, rows)
-    unfound.refuse_inputs(plant, U)
-    W, U, settled = settle(plant, response.gain, response.ever, 400)
+    alone = sizes(plant, response.ever + response.gain @ rest_at(plant, np.zeros(n + m)))
+    unfound.refuse_inputs(plant, alone[n:])
+    size, settled = settle(plant, response.gain, response.ever, 400)
     if not settled:
-        worst = int(np.argmax(W / alone))
-        raise NoDesign("no_fixed_point", worst, float(W[worst]), float(alone[worst]))
-    unfound.refuse_inputs(plant, U)
-    return np.maximum(W, plant.start), U
+        worst = int(np.argmax(size[:n] / alone[:n]))
+        raise NoDesign("no_fixed_point", worst, float(size[worst]), float(alone[worst]))
+    unfound.refuse_inputs(plant, size[n:])
+    return np.maximum(size[:n], plant.start), size[n:]
 
 
 class _Search:
@@ -103,24 +94,24 @@ class _Search:
         self.observer, self.report = observer, report
         self.plant = plant = observer.plant
         self.evaluations = 0
-        self.constant = rest_at(plant, *_nothing(plant))
-        self.started = bool(plant.start.any() or plant.eta_start.any())
-        self.counts = np.repeat([1.0, LATER][: 1 + self.started], len(plant.A)) / len(plant.A)
-        self.sizes: Array | None = None
-        sorts, sizes = np.repeat(range(6), observer.sizes()), np.repeat(observer.sizes(), observer.sizes())
+        self.n = len(plant.A)
+        self.constant = rest_at(plant, np.zeros(sum(plant.B.shape)))
+        self.counts = np.array([1.0, LATER if plant.start.any() or plant.eta_start.any() else 0.0]) / self.n
+        self.reference: Array | None = None
+        sorts, many = np.repeat(range(6), observer.sizes()), np.repeat(observer.sizes(), observer.sizes())
         self.groups = np.array([1.0 * (sorts == sort) for sort in (1, 2, 3, 4)])
-        self.singles = np.eye(len(sorts))[(sizes > 1) | (sorts == 0) | (sorts == 5)]
+        self.singles = np.eye(len(sorts))[(many > 1) | (sorts == 0) | (sorts == 5)]
 
     def _reach(self, weights: Array, steps: int) -> tuple[Response, Array, Array] | None:
-        """The response, W for ever and, if the start makes a difference, in the long run, and U."""
+        """The response, W for ever and in the long run (2, n), and U."""
         self.evaluations += 1
         theta = self.observer.table(weights)
         if theta is None or not (response := respond(self.plant, self.observer.sample, theta, SEARCHED)):
             return None
         added = response.gain @ self.constant if steps == 0 else 0.0
-        both = [response.ever, response.long_run][: 1 + self.started]
-        found = [settle(self.plant, response.gain, rows + added, steps) for rows in both]
-        return response, np.concatenate([W for W, _, _ in found]), found[0][1]
+        both = [response.ever, response.long_run] if self.counts[1] else [response.ever]
+        found = [settle(self.plant, response.gain, rows + added, steps)[0] for rows in both]
+        return response, np.array([found[0], found[-1]])[:, : self.n], found[0][self.n :]
 
     def _value(self, weights: Array) -> float:
         """What the search makes small.
@@ -128,13 +119,13 @@ class _Search:
         The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs leave
         their room or cost nothing, and for loops that forget slowly.
         """
-        if (reached := self._reach(weights, 0 if self.sizes is None else STEPS)) is None:
+        if (reached := self._reach(weights, 0 if self.reference is None else STEPS)) is None:
             return UNSTABLE
         response, W, U = reached
-        if self.sizes is None:
-            value = np.exp(np.log(np.maximum(W, 1e-30)) @ self.counts)
+        if self.reference is None:
+            value = np.exp(self.counts @ np.log(np.maximum(W, 1e-30)).sum(axis=1))
         else:
-            value = ((W / self.sizes) ** 8 @ self.counts) ** (1 / 8)
+            value = (self.counts @ ((W / self.reference) ** 8).sum(axis=1)) ** (1 / 8)
         over = np.maximum(0.0, U / self.plant.room - ROOM)
         free = np.where(np.isinf(self.plant.room), U, 1.0)
         return float(value * (1 + 5 * over + 50 * over**2).prod() * free.prod() ** FREE * response.lags**SLOW)
@@ -154,19 +145,20 @@ class _Search:
         if (reached := self._reach(weights, 0)) is None:
             return False
         response, W, U = reached
-        n = len(self.plant.A)
         wished = np.isfinite(self.plant.wishes)
-        self.sizes = W * (UNASKED if wished.any() else 1.0)
-        self.sizes.reshape(-1, n)[:, wished] = WISH * self.plant.wishes[wished]
-        grown = response.gain @ (rest_at(self.plant, W[:n], U) - self.constant)
+        grown = response.gain @ (rest_at(self.plant, np.r_[W[0], U]) - self.constant)
+        self.reference = W * (UNASKED if wished.any() else 1.0)
+        self.reference[:, wished] = WISH * self.plant.wishes[wished]
         return bool(wished.any() or (grown > 1e-4 * response.ever).any())
 
     def run(self, weights: Array) -> Array:
         """Along every direction while that gains, then along the whole sweep once more."""
         best = self._value(weights)
-        for factor, single in SWEEPS:
+        single = np.concatenate([self.groups, self.singles])
+        sweeps = [(factor, self.groups) for factor in COARSE] + [(factor, single) for factor in FINE]
+        for factor, directions in sweeps:
             origin = weights
-            for direction in np.concatenate([self.groups, self.singles]) if single else self.groups:
+            for direction in directions:
                 for move in (np.log(factor) * direction, -np.log(factor) * direction):
                     before, (weights, best) = best, self._along(move, weights, best)
                     if best < before:

@@ -18,7 +18,7 @@ from tubecert.loop_design.plant import Plant
 
 PANELS = 3  # of the midpoint rule in a sample
 NODES = (0.5, 1.0)  # of a sample, and where an input changes
-TAIL = 1e-4  # what the slowest mode may keep after the last lag
+TAIL = 1e-2  # what the slowest mode may keep after the last lag
 FAR = 1e4  # a tube that many times wider than without remainders has none
 
 
@@ -115,8 +115,7 @@ def _powers(rows: Array, matrix: Array, count: int) -> Array:
     """rows matrix^j for j = 0..count, by doubling; (count + 1, rows, -)."""
     found, power = rows[None], matrix
     while len(found) <= count:
-        later = found.reshape(-1, len(matrix)) @ power
-        found, power = np.concatenate([found, later.reshape(found.shape)]), power @ power
+        found, power = np.concatenate([found, found @ power]), power @ power  # products too small for threads
     return found[: count + 1]
 
 
@@ -139,18 +138,19 @@ def respond(plant: Plant, sample: Sample, theta: Array, most: int) -> Response |
     rows = direct @ hear
     rows[:-m, :held] += sample.rows
     powers = _powers(rows, loop, 2 * half)
-    past, drawn = powers[:-1], np.ascontiguousarray(powers[:-1, :, :n]).reshape(-1, n) @ sample.kernels
-    slope, level, wind, rest = parts(plant, drawn.reshape(PANELS, *past.shape[:2], -1))
+    past = powers[:-1]
+    drawn = past[:, :, :n] @ np.hstack([*sample.kernels])
+    slope, level, wind, rest = parts(plant, drawn.reshape(*past.shape[:2], PANELS, -1))
     noise = _size(past @ (act @ theta[:, :n] * plant.noise), plant.noise_ball)
     now = np.pad(sample.now, (0, m)) + _size(direct[:, :n] * plant.noise, plant.noise_ball)
-    known = now + _summed(noise + _size(wind, plant.wind_ball).sum(0))
+    known = now + _summed(noise + _size(wind, plant.wind_ball).sum(2))
     entry = np.pad(sample.eta, ((0, m), (0, 0))) + _summed(past[:, :, :held] @ sample.H)
     lasting, from_start = _of_eta(plant, entry, slope, level)
     begun = (known + from_start + np.abs(powers[:, :, :n]) @ plant.start).max(axis=0)
     known += lasting
     kept = 1 / (1 - slowest**half)  # of what the second half of the lags adds: all the lags that follow
     long_run = known[half] + kept * (known[-1] - known[half])
-    rests = np.abs(rest).sum(0)
+    rests = np.abs(rest).sum(2)
     gain = np.pad(sample.now_rest, ((0, m), (0, 0))) + rests[:half].sum(0) + kept * rests[half:].sum(0)
     return Response(long_run=long_run, ever=np.maximum(begun, long_run), gain=gain, lags=lags)
 
@@ -167,36 +167,36 @@ def _of_eta(plant: Plant, entry: Array, slope: Array, level: Array) -> tuple[Arr
     of the rows, and all that is older is a signal of its magnitude. From the start it need not be cut.
     """
     panel = plant.sample_time / PANELS
-    grown = _summed(np.abs(slope + panel * entry[:-1]).sum(0) * plant.rate)
-    old = _summed(np.abs(level).sum(0) * plant.magnitude)
+    grown = _summed(np.abs(slope + panel * entry[:-1, :, None]).sum(2) * plant.rate)
+    old = _summed(np.abs(level).sum(2) * plant.magnitude)
     cut = np.minimum.accumulate(grown + np.abs(entry) * plant.magnitude - old, axis=0) + old
     return cut.sum(axis=2), np.minimum(cut, grown + np.abs(entry) * plant.eta_start).sum(axis=2)
 
 
-def rest_at(plant: Plant, W: Array, U: Array) -> Array:
-    """The remainder, a huge number where it is not defined."""
-    rho: Array = np.minimum(np.nan_to_num(plant.remainder(W, U), nan=np.inf, posinf=np.inf), 1e300)
-    return rho
+def rest_at(plant: Plant, size: Array) -> Array:
+    """The remainder of a tube of that size (W, U), a huge number where it is not defined."""
+    rho: Array = np.nan_to_num(plant.remainder(*np.split(size, [len(plant.A)])), nan=np.inf)
+    return np.minimum(rho, 1e300)
 
 
-def split(plant: Plant, rows: Array) -> tuple[Array, Array]:
-    """W (n,), the largest over the nodes, and U (m,)."""
+def sizes(plant: Plant, rows: Array) -> Array:
+    """(W, U), W the largest of the nodes."""
     n, m = plant.B.shape
-    return rows[:-m].reshape(-1, n).max(axis=0), rows[-m:]
+    return np.concatenate([rows[:-m].reshape(-1, n).max(axis=0), rows[-m:]])
 
 
-def settle(plant: Plant, gain: Array, rows: Array, steps: int) -> tuple[Array, Array, bool]:
-    """W, U after so many steps of rows + gain rho(W, U), and whether they settled.
+def settle(plant: Plant, gain: Array, rows: Array, steps: int) -> tuple[Array, bool]:
+    """(W, U) after so many steps of rows + gain rho(W, U), and whether they settled.
 
     Where they grow `FAR` they are cut off there, times the steps left: a search sees how far from a fixed point it is.
     """
-    W, U = split(plant, rows)
-    ceiling = FAR * (rows + gain @ rest_at(plant, W, U))
+    size = sizes(plant, rows)
+    ceiling = FAR * (rows + gain @ rest_at(plant, size))
     for left in range(steps, 0, -1):
-        grown = rows + gain @ rest_at(plant, W, U)
+        grown = rows + gain @ rest_at(plant, size)
         if (grown > ceiling).any():
-            return *split(plant, np.minimum(grown, ceiling) * (1 + left)), False
-        before, (W, U) = np.r_[W, U], split(plant, grown)
-        if np.allclose(np.r_[W, U], before, rtol=1e-6, atol=0):
-            return W, U, True
-    return W, U, False
+            return sizes(plant, np.minimum(grown, ceiling)) * (1 + left), False
+        before, size = size, sizes(plant, grown)
+        if np.allclose(size, before, rtol=1e-6, atol=0):
+            return size, True
+    return size, False

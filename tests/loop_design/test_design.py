@@ -1,0 +1,149 @@
+"""What the search finds, against numbers of other searches, in other units, and where there is nothing to find."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machines import double, plant, pvtol, scalar
+
+from tubecert.loop_design.design import design
+from tubecert.loop_design.unfound import NoDesign
+
+
+def mean(W):
+    return np.exp(np.log(W).mean())
+
+
+# geometric means of the widths that other searches, with ten times as many evaluations, have found
+@pytest.mark.slow
+@pytest.mark.parametrize(("machine", "widths"), [
+    (scalar(0.0), [1.0]),
+    (scalar(0.1), [1.3]),
+    (scalar(1.0), [3.67]),
+    (scalar(10.0), [20.2]),
+    (double(), [4.75, 7.92]),
+    (double(delay=1.0), [11.8, 16.1]),
+    (double((0.0, 0.0)), [0.80, 1.62]),
+    (double((10.0, 3.0)), [22.9, 22.0]),
+])  # fmt: skip
+def test_widths_are_those_of_a_longer_search(machine, widths):
+    found = design(machine)
+    assert mean(found.W) < 1.05 * mean(widths)
+    assert np.isfinite(found.F).all()
+
+
+@pytest.mark.slow
+def test_a_quadrotor_with_noise_keeps_a_tube_within_its_inputs():
+    machine = pvtol(0.002)
+    found = design(machine)
+    assert mean(found.W) < 1.05 * mean([0.0093, 0.0038, 0.0058, 0.0148, 0.0089, 0.054])
+    assert (machine.room >= found.U).all()
+    assert (found.W > 0).all()
+    x, z = [0, 2, 3, 5], [1, 4]  # hovering decouples
+    assert not found.N[np.ix_([0], x)].any()
+    assert not found.N[np.ix_([1], z)].any()
+
+
+@pytest.mark.slow
+def test_a_quadrotor_without_noise_uses_its_inputs():
+    found = design(pvtol(0.0))
+    assert 0.9 * 2.0 < found.U[1] <= 2.0
+    assert found.W[0] < 1e-4
+
+
+def test_tables_are_numbers_of_single_precision_and_the_same_every_time():
+    told = []
+    first, second = design(double(), lambda *step: told.append(step)), design(double())
+    for name in "FGMN":
+        table = getattr(first, name)
+        np.testing.assert_array_equal(table, table.astype(np.float32))
+        np.testing.assert_array_equal(table, getattr(second, name))
+    counts, values = zip(*told, strict=True)
+    assert list(counts) == sorted(counts)
+    assert list(values) == sorted(values, reverse=True)
+    assert counts[-1] <= first.evaluations
+
+
+@pytest.mark.slow
+def test_units_do_not_matter():
+    """States in km and mm, the input in mN, h in kN: the same widths in the new units."""
+    machine = double((0.5, 0.3), delay=0.4, room=[4.0], magnitude=2.0)
+    s, u, a = np.array([1e-3, 1e3]), 1e3, 1e-3
+    other = replace(
+        machine,
+        A=machine.A * s[:, None] / s,
+        B=machine.B * s[:, None] / u,
+        H=machine.H * s[:, None] / a,
+        noise=machine.noise * s,
+        magnitude=machine.magnitude * a,
+        rate=machine.rate * a,
+        room=machine.room * u,
+    )
+    one, two = design(machine), design(other)
+    np.testing.assert_allclose(two.W, one.W * s, rtol=0.02)
+    np.testing.assert_allclose(two.U, one.U * u, rtol=0.02)
+
+
+def test_components_of_eta_that_do_the_same_are_one_for_the_observer():
+    """h through B and what a parameter does in the same row; one of them never moves."""
+    twice = double(H=[[0, 0], [1, -2.0]], rate=[1.0, 0.0], magnitude=[5.0, 0.5])
+    assert len(design(twice).F) == len(design(double()).F) == 4
+
+
+def test_a_constant_that_is_unknown_is_learnt():
+    """Without a rate the long run knows it; delta must still be able to cancel it."""
+    found = design(plant([[0]], [[1]], noise=0.01, magnitude=1.0, room=[2.0]))
+    assert found.W[0] < 0.1
+    assert 1.0 <= found.U[0] <= 2.0
+
+
+@pytest.mark.slow
+def test_a_wish_is_paid_by_other_states():
+    plain = design(double())
+    wished = design(double(wishes=[np.inf, 0.8 * plain.W[1]]))
+    assert wished.W[1] < 0.9 * plain.W[1]
+    assert wished.W[0] > plain.W[0]
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.4, 1.0, 2.5])
+def test_nothing_acts_and_nothing_is_asked(delay):
+    """No noise, no eta, no wind, no limits: only a start."""
+    found = design(plant([[1.0]], [[1.0]], H=np.zeros((1, 0)), delay=delay, sample_time=0.2, start=1.0))
+    assert 1.0 <= found.W[0] < 30
+    assert np.isfinite(found.F).all()
+
+
+def refused(machine):
+    with pytest.raises(NoDesign) as error:
+        design(machine)
+    return error.value
+
+
+def test_a_mode_that_no_input_moves_is_named():
+    drifts = plant([[-1, 0, 0], [0, 0.1, 0], [1, 0, -2]], [[1], [0], [0]], noise=0.1)
+    found = refused(drifts)
+    assert (found.kind, found.where) == ("no_design", 1)
+    assert found.needed == pytest.approx(0.1)
+    fades = replace(drifts, A=drifts.A * [1, -1, 1])
+    assert design(fades).W[1] < 1e-6
+
+
+def test_an_input_that_no_controller_could_do_with_is_refused_before_a_search():
+    pole = plant([[1.0]], [[1.0]], E=[[1.0]], wind=0.5, noise=0.01, room=[1.0], sample_time=0.5, delay=0.5)
+    found = refused(pole)
+    assert (found.kind, found.where, found.allowed) == ("inputs", 0, 1.0)
+    assert found.needed == pytest.approx(0.5 * np.e)
+    assert refused(replace(pole, room=np.zeros(1))).kind == "inputs"
+
+
+def test_an_input_that_is_too_small_is_told_with_what_it_needs():
+    found = refused(scalar(0.1, room=[0.5]))
+    assert (found.kind, found.where, found.allowed) == ("inputs", 0, 0.5)
+    assert found.needed > 1e3
+
+
+def test_a_remainder_without_a_tube_is_told_with_the_state():
+    wild = scalar(1.0, rho=lambda W, U: np.r_[50 * W**2, 0.0])
+    found = refused(wild)
+    assert (found.kind, found.where) == ("no_fixed_point", 0)
+    assert found.needed > found.allowed > 1
