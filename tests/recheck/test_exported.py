@@ -6,12 +6,12 @@ import re
 import handmade
 import pytest
 from commands import run
-from tubecert.recheck.sampled_loop.record import read_certificate
 
 from tubecert.controller.data import data_of
 from tubecert.controller.folder import files_of, write
 from tubecert.recheck.document import read
 from tubecert.recheck.sampled_loop.exported import Exported, exported
+from tubecert.recheck.sampled_loop.record import read_certificate
 from tubecert.sampled_loop.file import certificate_text
 from tubecert.sampled_loop.record import PlanKnots
 

@@ -67,6 +67,7 @@ class SampledSpecification:
     uncertainty: Uncertainty
     trajectory: Trajectory
     afterwards: str
+    half_widths: dict[str, Fraction]  # at most; empty if none are asked for
     start: Start
     obstacles: tuple[Obstacle, ...]
     limits: dict[str, Range]  # by input, of some of them
@@ -117,7 +118,7 @@ def read_specification(node: Node) -> Specification:
 def read_sampled_specification(node: Node) -> SampledSpecification:
     """That of a loop that a computer closes; raises `CertificateError` for whatever is not of the canonical form.
 
-    B may depend on parameters known by ranges; f is free of t. Half-widths are wishes, of which nothing is claimed.
+    B may depend on parameters known by ranges; f is free of t. Half-widths are at most those asked for.
     """
     own = node.closed(*_ALWAYS, "hardware", "controller", optional=(*IDLE[1:], "disturbance"))
     _version(own["tubecert"])
@@ -126,7 +127,6 @@ def read_sampled_specification(node: Node) -> SampledSpecification:
     if plant.varies:
         raise own["system"].refused("has an f that depends on t, which a sampled loop may not have")
     wishes = own["tube"].closed(optional=("half_widths",))
-    wishes.get("half_widths", lambda item: _some(item, tuple(plant.lengths), positive))
     trajectory, afterwards = read_lasting(own["trajectory"], plant)
     states = plant.states
     found = SampledSpecification(
@@ -134,6 +134,7 @@ def read_sampled_specification(node: Node) -> SampledSpecification:
         uncertainty=read_uncertainty(own["uncertainty"], plant, sudden=True),
         trajectory=trajectory,
         afterwards=afterwards,
+        half_widths=wishes.get("half_widths", lambda item: _some(item, tuple(plant.lengths), positive)) or {},
         start=read_start(own["initial_state"], states),
         obstacles=_obstacles(own, plant),
         limits=own.get("limits", lambda item: _some(item, plant.inputs, ends)) or {},

@@ -19,12 +19,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
-from tubecert.recheck.sampled_loop.record import Certificate, Proven
-from tubecert.recheck.sampled_loop.windows import course_of
-
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import stated
 from tubecert.recheck.sampled_loop.held import HEX, HeldPlan, Rows, single
+from tubecert.recheck.sampled_loop.record import Certificate, Proven
+from tubecert.recheck.sampled_loop.windows import course_of
 
 _SHIPPED: Final = Path(__file__).parents[2] / "controller"
 _RUNTIME: Final = ("controller.c", "controller.h", "selftest.c")

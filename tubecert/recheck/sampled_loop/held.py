@@ -17,10 +17,10 @@ from math import ceil
 from typing import Final
 
 from flint import ctx
-from tubecert.recheck.sampled_loop.windows import Course
 
 from tubecert.recheck.balls import Ball, exact, floor
 from tubecert.recheck.program import Program
+from tubecert.recheck.sampled_loop.windows import Course
 from tubecert.recheck.terms import Term, number, operation, variable
 
 HEX: Final = r"-?0x[01](?:\.[0-9a-f]+)?p[-+]\d{1,4}"
