@@ -136,7 +136,9 @@ def _finding(spec: Spec, code: str, path: str, message: str, help: str) -> Findi
 
 
 def _knots(spec: Spec, model: ControlAffineModel, report: Progress | None) -> Knots | None:
-    """The planner's knots where the specification asks for them."""
+    """The knots of a plan in a file, or the planner's where the specification asks for them."""
+    if (table := spec.trajectory.table) is not None:
+        return table.knots
     task = spec.trajectory.task
     if task is None:
         return None

@@ -24,6 +24,7 @@ _FORGOTTEN: Final = 1e-4  # what is left of the oldest sample that counts
 _FEWEST: Final = 8
 _PARTS: Final = (2, 4, 8, 16)
 _SETTLED: Final = 5e-3  # finer pieces that gain less are not worth it
+_SHORTER: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the lags, where they are enough
 _STEPS: Final = 200
 _LARGE: Final = 1e6
 _STEADY: Final = 0.9  # a long run that is not narrower than this of the tube is no stage of its own
@@ -70,6 +71,11 @@ def propose(
     several, many = _in_stages(found, report)
     if many is not None and (many.W[-1] < _STEADY * many.W.max(axis=0)).any():
         found, boxes = several, many
+    for share in _SHORTER:
+        fewer = found.shorter(max(1, int(share * lags)))
+        if _within(fewer.of(boxes), boxes, 1 + _SETTLED):
+            found, boxes = fewer, _fixed_point(fewer, boxes, report)
+            break
     return found, _stages(loop, boxes, found.starts)
 
 

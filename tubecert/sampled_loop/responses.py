@@ -8,6 +8,7 @@ Implements: theory of the sampled loop, section 3.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
@@ -206,6 +207,14 @@ class Responses:
         self.pieces = [self._piece(i) for i in range(len(self.nodes) - 1)]
         self.direct = [self._direct(s) for s in self.nodes]
         self.count = n * len(self.nodes) + loop.inputs + controller.size
+
+    def shorter(self, lags: int) -> Responses:
+        """The same over fewer lags; what the free rows miss is still counted over all."""
+        found = copy(self)
+        found.lags = lags
+        for name in ("rows", "eta", "noise", "wind", "rounding", "rho", "rate", "size"):
+            setattr(found, name, getattr(self, name)[: lags + 1])
+        return found
 
     def _outputs(self, flows: Sequence[Flow]) -> None:
         own, c = self.dynamics, self.controller
