@@ -64,6 +64,8 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
     weights = search.run(search.within())
     if search.refer(weights):
         weights = search.run(weights)
+        if not search.meets_wishes(weights):
+            weights = min(weights, search.run(search.within()), key=search.value)
     if (found := observer.table(weights)) is None:
         raise NoDesign("no_design")
     (n, m), theta = plant.B.shape, rounded(observer, found, units)
@@ -113,7 +115,7 @@ class _Search:
         found = [settle(self.plant, response.gain, rows + added, steps)[0] for rows in both]
         return response, np.array([found[0], found[-1]])[:, : self.n], found[0][self.n :]
 
-    def _value(self, weights: Array) -> float:
+    def value(self, weights: Array) -> float:
         """What the search makes small.
 
         The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs leave
@@ -151,9 +153,14 @@ class _Search:
         self.reference[:, wished] = WISH * self.plant.wishes[wished]
         return bool(wished.any() or (grown > 1e-4 * response.ever).any())
 
+    def meets_wishes(self, weights: Array) -> bool:
+        """Whether the tube of these weights is as narrow as wished."""
+        reached = self._reach(weights, STEPS)
+        return reached is not None and bool((reached[1] <= self.plant.wishes).all())
+
     def run(self, weights: Array) -> Array:
         """Along every direction while that gains, then along the whole sweep once more."""
-        best = self._value(weights)
+        best = self.value(weights)
         single = np.concatenate([self.groups, self.singles])
         sweeps = [(factor, self.groups) for factor in COARSE] + [(factor, single) for factor in FINE]
         for factor, directions in sweeps:
@@ -167,7 +174,7 @@ class _Search:
         return weights
 
     def _along(self, move: Array, weights: Array, best: float) -> tuple[Array, float]:
-        while move.any() and (value := self._value(weights + move)) < best * (1 - GAIN):
+        while move.any() and (value := self.value(weights + move)) < best * (1 - GAIN):
             weights, best = weights + move, value
             self.report(self.evaluations, best)
         return weights, best
