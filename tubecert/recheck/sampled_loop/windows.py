@@ -84,7 +84,9 @@ class Course:
             joined = knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
             whole = (horizon / self.spec.hardware.sample_time).denominator == 1 and knots.t[-1] == horizon
             return "" if joined and whole else "its ends differ, or its horizon is no whole number of samples"
-        period = common_period([*self.curve.x, *self.curve.u]).ball
+        if not isinstance(plan := self.spec.trajectory, Expressed):
+            return ""
+        period = common_period([*plan.x, *plan.u]).ball
         return "" if period <= exact(horizon) else "its period is longer than its horizon"
 
     # -- windows

@@ -1,0 +1,147 @@
+"""Certificates of small sampled loops for tests of the checker: tables by hand, the producer's fixed point."""
+
+import copy
+import json
+from functools import cache
+
+import numpy as np
+from rechecked import digest, failing
+
+from tubecert.certificate.effective import Effective
+from tubecert.errors import TubecertError
+from tubecert.loop_design.proposal import propose
+from tubecert.model import build
+from tubecert.recheck.run import Recheck, recheck
+from tubecert.sampled_loop.file import certificate_text, seal
+from tubecert.sampled_loop.record import Claim, HexMatrix, Nominal, Notes, Result, Source, Tables
+from tubecert.sampled_loop.remainders import Remainders
+from tubecert.sampled_loop.setting import Controller, Loop
+from tubecert.sampled_loop.theorem import check
+from tubecert.spec import load_text
+from tubecert.spec.canonical import canonical
+from tubecert.trajectory.make import plan_of
+
+SCALAR = """
+tubecert: 1
+name: scalar
+system: {states: [x], inputs: [u], f: ["0.5*x"], B: [[1]]}
+safe_set: {x: [-5, 5]}
+trajectory: {kind: equilibrium, at: [0], input: [0]}
+initial_state: {at: [0.3]}
+hardware: {sample_time: 0.1, delay: 0.04, noise: {x: 0.01}}
+disturbance: {E: [[1]], bound: [0.2]}
+limits: {u: [-3, 3]}
+"""
+CART = """
+tubecert: 1
+name: cart
+system: {states: [p, v], inputs: [F], f: [v, "0.1*p**2"], B: [[0], [1]], outputs: {far: "p + v"}}
+safe_set: {p: [-9, 9], v: [-9, 9]}
+uncertainty: {h: ["0.2*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0, 0], input: [0]}
+initial_state: {box: {p: [-0.1, 0.1], v: [-0.1, 0.1]}}
+hardware: {rate: 20, delay: 0.12, noise: 0.001}
+disturbance: {E: [[0], [1]], bound: 0.1}
+tube: {half_widths: {p: 1, far: 2}}
+obstacles:
+  - {states: [p, v], disc: {center: [2, 2], radius: 0.5}}
+  - {states: [p, v], polygon: [[2, -1], [3, -1], [3, 1]]}
+"""
+SWING = """
+tubecert: 1
+name: swing
+system: {states: [q], inputs: [u], parameters: {c: [0.9, 1.1]}, f: ["-c*q"], B: [[1]]}
+safe_set: {q: [-2, 2]}
+uncertainty: {h: ["0.05*sin(3*t) + 0.02*q"]}
+trajectory: {kind: expressions, x: ["sin(t)"], u: ["cos(t) + sin(t)"], horizon: 6.3, afterwards: repeat}
+initial_state: {at: [0]}
+hardware: {rate: 10, delay: one sample, hold: left, arithmetic: single}
+"""
+
+
+def tables(N, F=(), G=(), M=()) -> Tables:
+    N = np.atleast_2d(np.array(N, dtype=np.float32).astype(float))
+    (m, n), z = N.shape, len(F)
+    shaped = ((F, (z, z)), (G, (z, n)), (M, (m, z)))
+    own = [np.array(np.float32(value), dtype=float).reshape(shape) for value, shape in shaped]
+    return Tables(**{name: HexMatrix(value) for name, value in zip("FGMN", (*own, N), strict=True)})
+
+
+@cache
+def _proven(text: str, gain: tuple, slow: bool) -> str:
+    spec = load_text(text)
+    model, own = build(spec), tables(*gain)
+    n, m = len(spec.states), len(spec.inputs)
+    A, B, E = (np.array(value, dtype=float) for value in MATRICES[spec.name])
+    matrices = {"A": A.reshape(n, n), "B": B.reshape(n, m), "E": E.reshape(n, -1)}
+    loop = Loop(spec=spec, model=model, plan=plan_of(spec, model), knots=None, slow=slow, **matrices)
+    inequalities, stages = propose(Remainders(loop, 64), Controller.of(own))
+    found = check(loop, Controller.of(own), stages, inequalities.recipe, inequalities)
+    data = canonical(spec)
+    result = Result(
+        verdict=found.verdict,
+        spec=Source(effective=Effective.of(data), effective_hash=digest(data), file_hash="sha256:0"),
+        claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
+        nominal=Nominal(**{name: HexMatrix(value) for name, value in matrices.items()}),
+        controller=own,
+        tube=stages,
+        inputs=found.inputs,
+        clearance=found.clearance,
+        recipe=inequalities.recipe,
+        lacks=found.lacks,
+    )
+    return certificate_text(seal(result, Notes(), {}))
+
+
+MATRICES = {
+    "scalar": ([0.5], [1], [1]),
+    "cart": ([0, 1, 0, 0], [0, 1], [0, 1]),
+    "swing": ([-1], [1], []),
+}
+GAINS = {
+    SCALAR: ([[-3]],),
+    CART: ([[-1.5, -2]], [[0.5]], [[0, 0.1]], [[-0.1]]),
+    SWING: ([[-2]],),
+}
+
+
+def made(text: str, *, base: str | None = None, slow: bool = True) -> dict:
+    """A certificate, as JSON; `base`: whose tables and matrices it has."""
+    gain = json.loads(json.dumps(GAINS[base or text]), object_hook=dict)
+    frozen = tuple(tuple(map(tuple, value)) for value in gain)
+    return json.loads(_proven(text, frozen, slow))
+
+
+def changed(document: dict, *path, to) -> dict:
+    """With another value at a place (or what a function makes of the one that is there), hashes made right again."""
+    found = copy.deepcopy(document)
+    place = found["result"]
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = to(place[path[-1]]) if callable(to) else to
+    return resealed(found)
+
+
+def resealed(document: dict) -> dict:
+    spec = document["result"].get("spec", {})
+    if {"effective", "effective_hash"} <= spec.keys():
+        spec["effective_hash"] = digest(spec["effective"])
+    return {**document, "hash": digest(document["result"])}
+
+
+def examine(document: dict, **options) -> Recheck:
+    return recheck(json.dumps(document), "certificate", **options)
+
+
+def why_not(document: dict) -> list[str]:
+    """The claims that do not hold."""
+    return [name for name, _ in failing(examine(document))]
+
+
+def code_of(document: dict) -> str:
+    """Of the error with which reading ends, or nothing."""
+    try:
+        examine(document)
+    except TubecertError as error:
+        return error.findings[0].code
+    return ""

@@ -1,0 +1,160 @@
+"""The sums of the checker against the worst that signals do: an oracle in floats that shares nothing with it."""
+
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from flint import arb, arb_mat, ctx
+from scipy.linalg import expm
+from scipy.optimize import linprog
+
+from tubecert.recheck.sampled_loop.conditions import Inequalities, phases_of
+from tubecert.recheck.sampled_loop.exponential import flow
+from tubecert.recheck.sampled_loop.loop import Loop
+from tubecert.recheck.sampled_loop.record import Recipe, Stage
+from tubecert.recheck.sampled_loop.rows import Ground, Problem, Signals, Start
+
+FINE = 12  # parts of a sample, of which whole numbers are late
+SAMPLE = Fraction(1, 4)
+
+
+def test_an_exponential_holds_every_entry():
+    """Of [0 1; 1 0]: a remainder entry by entry would leave out those that the powers so far do not reach."""
+    A = arb_mat([[0, 1], [1, 0]])
+    for t in (arb("0.4"), arb(0.4, 0.1), arb(0)):
+        moved, steady = flow(A, t)
+        for i in (0, 1):
+            assert moved[i, i].overlaps(t.cosh())
+            assert moved[i, 1 - i].overlaps(t.sinh())
+            assert steady[i, i].overlaps(t.sinh())
+            assert steady[i, 1 - i].overlaps(t.cosh() - 1)
+    wide = flow(A, arb(0.4, 0.1))[0][0, 1]
+    assert wide.contains(arb("0.3").sinh())
+    assert wide.contains(arb("0.5").sinh())
+
+
+class Case:
+    """A loop with random tables, its signals, and the floats of both."""
+
+    def __init__(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        self.n, self.z, self.late = int(rng.integers(1, 3)), int(rng.integers(0, 3)), int(rng.integers(0, 31))
+        n, z = self.n, self.z
+        self.A = rng.normal(size=(n, n)).round(2)
+        self.B = rng.normal(size=(n, 1)).round(2)
+        self.H, self.E = self.B.copy(), rng.normal(size=(n, 1)).round(2)
+        self.F, self.G = 0.4 * rng.normal(size=(z, z)), 0.5 * rng.normal(size=(z, n))
+        self.M, self.N = 0.5 * rng.normal(size=(1, z)), 0.5 * rng.normal(size=(1, n))
+        self.noise, self.wind = rng.uniform(0.01, 0.1, size=n), float(rng.uniform(0.1, 1))
+        self.size, self.rate = 1.0, float(rng.uniform(0.1, 4))
+        self.first, self.start = float(rng.uniform(0, 1)), rng.normal(size=n)
+        self.lags = 9
+        self.cuts = tuple((int(rng.integers(0, 10)),) for _ in range(n + 1 + z))
+
+    def problem(self) -> tuple[Problem, Recipe]:
+        delay = SAMPLE * Fraction(self.late, FINE)
+        named = {
+            name: arb_mat(getattr(self, name).tolist())
+            if getattr(self, name).size
+            else arb_mat(*getattr(self, name).shape)
+            for name in "ABHFGMN"
+        }
+        loop = Loop(**named, sample=SAMPLE, delay=delay)
+        signals = Signals(
+            noise=[*map(arb, self.noise)],
+            noise_length=False,
+            winds=[(arb_mat(self.E.tolist()), [arb(self.wind)], False)],
+            slow=[arb(self.size)],
+            rates=[arb(self.rate)],
+            first=[arb(self.first)],
+        )
+        n, z = self.n, self.z
+        stage = Stage(0, (Fraction(10**6),) * n, (Fraction(10**6),), (Fraction(10**6),) * z)
+        nothing = [[arb(0)] * k for k in (n, 1, n, 1, z)]
+        ground = Ground(0, stage, *nothing, [arb(1)] * loop.width)
+        start = Start([*map(arb, self.start)], arb(0))
+        recipe = Recipe(self.lags, self.cuts, 2, 8, 1, True)
+        return Problem(loop, signals, start, [ground], self.lags, self.lags), recipe
+
+    def responses(self, k: int, part: int, state: int | None) -> dict[str, np.ndarray]:
+        """What e_state at a part of sample k, or delta_k, answers to every signal, part by part."""
+        count = k * FINE + part
+        block = np.zeros((self.n + 3, self.n + 3))
+        block[: self.n] = np.hstack([self.A, self.B, self.H, self.E])
+        step = expm(block * float(SAMPLE) / FINE)[: self.n]
+        n, z = self.n, self.z
+        inputs = n + (k + 1) * n + 2 * max(count, 1) + 1  # start, noise, eta (at every end of a part), wind
+        e, zeta, sent = np.zeros((n, inputs)), np.zeros((z, inputs)), []
+        e[:, :n] = np.eye(n)
+        eta, wind = n + (k + 1) * n, n + (k + 1) * n + count + 1
+        held = np.zeros((1, inputs))
+        for i in range(count + (state is None)):
+            if i % FINE == 0:
+                heard = e.copy()
+                heard[:, n + (i // FINE) * n : n + (i // FINE + 1) * n] += np.eye(n)
+                sent.append(self.M @ zeta + self.N @ heard)
+                zeta = self.F @ zeta + self.G @ heard
+                if i == count:
+                    break
+            due = (i - self.late) // FINE
+            held = sent[due] if due >= 0 else np.zeros((1, inputs))
+            e = step[:, :n] @ e + step[:, n : n + 1] @ held
+            e[:, eta + i] += 0.5 * step[:, n + 1]
+            e[:, eta + i + 1] += 0.5 * step[:, n + 1]
+            e[:, wind + i] += step[:, n + 2]
+        row = sent[-1][0] if state is None else e[state]
+        return {
+            "start": row[:n],
+            "noise": row[n:eta].reshape(-1, n),
+            "eta": row[eta:wind],
+            "wind": row[wind:],
+        }
+
+    def worst(self, k: int, part: int, state: int | None) -> float:
+        own = self.responses(k, part, state)
+        fixed = abs(own["start"] @ self.start) + np.abs(own["noise"]).sum(axis=0) @ self.noise
+        return float(fixed + np.abs(own["wind"]).sum() * self.wind + self.slow(own["eta"]))
+
+    def slow(self, weights: np.ndarray) -> float:
+        """Sup of weights eta with |eta| <= size, |eta'| <= rate, |eta(0)| <= first: a linear program."""
+        count = len(weights)
+        if count < 2:
+            return float(np.abs(weights).sum() * self.first)
+        steps = np.diff(np.eye(count), axis=0)
+        most = np.full(2 * (count - 1), self.rate * float(SAMPLE) / FINE)
+        bounds = [(-self.first, self.first), *[(-self.size, self.size)] * (count - 1)]
+        return float(-linprog(-weights, A_ub=np.vstack([steps, -steps]), b_ub=most, bounds=bounds).fun)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_no_signal_does_more_than_the_sums_say_and_the_worst_does_nearly_as_much(seed):
+    """Delays of 0 to 2.5 samples, cuts at random: e at the nodes and between them, delta, at every sample."""
+    case = Case(seed)
+    problem, recipe = case.problem()
+    with ctx.workprec(53):
+        made = Inequalities(problem, recipe)
+        errors, unit = made._first, 2.0**-160
+        carried, added = errors._carried, errors._added
+        made._over(recipe.panels, 0, [Fraction(10**9)])
+        deltas = made._kept[recipe.panels][0]
+    nodes = [float(s / SAMPLE) * FINE for s in errors._nodes]
+    shares = []
+    for k in (0, 1, 2, 4, 8):
+        for i in range(case.n):
+            for a, (begin, end) in enumerate(pairwise(nodes)):
+                bound = unit * (max(carried[(a + b) * case.n + i][k] for b in (0, 1)) + added[a][i][0])
+                for part in range(int(np.ceil(begin - 1e-9)), int(end + 1e-9) + 1):
+                    attained = case.worst(k, part, i)
+                    assert attained <= bound * (1 + 2e-3), (k, i, part)
+        attained = case.worst(k, 0, None)
+        assert attained <= unit * deltas[k] * (1 + 2e-3), k
+        shares.append(attained / max(unit * deltas[k], 1e-300))
+    assert max(shares) > 0.9
+
+
+def test_phases_hold_the_commands_that_wait():
+    stages = [Stage(k, (Fraction(1),), (Fraction(u),), ()) for k, u in ((0, 5), (10, 3), (11, 1))]
+    found = [(begin, stage.start, most) for begin, stage, (most,) in phases_of(stages, 2)]
+    assert found == [(0, 0, 5), (10, 10, 5), (11, 11, 5), (12, 11, 3), (13, 11, 1)]
