@@ -34,7 +34,7 @@ def spec(*path):
 N = ("controller", "N", "rows", 0, 0)
 LIES = {
     "W x .98": (SCALAR, ("tube", 0, "half_widths", "x"), narrower),
-    "W x .98, later": (SCALAR, ("tube", -1, "half_widths", "x"), narrower),
+    "W x .94, later": (SCALAR, ("tube", -1, "half_widths", "x"), lambda W: narrower(W) * 0.96),
     "W x .98, of another state": (CART, ("tube", 0, "half_widths", "p"), narrower),
     "U x .98": (CART, ("tube", 0, "deviations", "F"), narrower),
     "Z x .98": (CART, ("tube", 0, "memory", 0), narrower),

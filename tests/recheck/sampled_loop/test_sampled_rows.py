@@ -136,7 +136,7 @@ def test_no_signal_does_more_than_the_sums_say_and_the_worst_does_nearly_as_much
     with ctx.workprec(53):
         made = Inequalities(problem, recipe)
         errors, unit = made._first, 2.0**-160
-        carried, added = errors._carried, errors._added
+        assert [*errors.bounds(0, 0)]
         made._over(recipe.panels, 0, [Fraction(10**9)])
         deltas = made._kept[recipe.panels][0]
     nodes = [float(s / SAMPLE) * FINE for s in errors._nodes]
@@ -144,7 +144,7 @@ def test_no_signal_does_more_than_the_sums_say_and_the_worst_does_nearly_as_much
     for k in (0, 1, 2, 4, 8):
         for i in range(case.n):
             for a, (begin, end) in enumerate(pairwise(nodes)):
-                bound = unit * (max(carried[(a + b) * case.n + i][k] for b in (0, 1)) + added[a][i][0])
+                bound = unit * [*errors.bounds(i, k)][a]
                 for part in range(int(np.ceil(begin - 1e-9)), int(end + 1e-9) + 1):
                     attained = case.worst(k, part, i)
                     assert attained <= bound * (1 + 2e-3), (k, i, part)

@@ -1,7 +1,7 @@
 """The inequalities of the sampled loop at every sample: of the errors, of what the controller adds, of its memory.
 
 b(k) bounds an output at sample k if the loop has kept to its boxes before; below what is claimed at every k there is no
-first exit. Between two nodes of a sample e is near the chord, d^2/8 sup|c''|. Implements: theory of the sampled loop,
+first exit. Between two nodes of a sample e is near a chord, d^2/8 sup|c''|. Implements: theory of the sampled loop,
 theorem 5.
 """
 
@@ -28,6 +28,9 @@ _FLUSHED = Fraction(1, 10**35)  # what a computer loses that has no subnormal nu
 _PLAN = Fraction(1, 2**24)  # what it misses x* and u* by, of their largest size
 _SECOND = 1 + Fraction(1, 2**20)  # rounding of what is a rounding already
 _FEW = 4  # panels that are tried before those of the recipe
+
+Added = tuple[tuple[int, int, int], ...]
+"""Ways to bound what is between two ends: what is added to either, and to the larger of both."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +85,8 @@ class _Outputs:
         phases = [problem.phase(k) for k in range(problem.last + 1)]
         return [
             [
-                sums.upto(f, k) + self._heard[f][p] + (self._missed[f][p] if k else 0)
-                for k, p in enumerate(phases)
+                x + self._heard[f][p] + (self._missed[f][p] if k else 0)
+                for k, (x, p) in enumerate(zip(sums.of(f), phases, strict=True))
             ]
             for f in range(self._first.nrows())
         ]
@@ -118,48 +121,75 @@ class _Errors:
         return outputs.carried(self._cuts, self._panels)
 
     @cached_property
-    def _added(self) -> list[list[list[int]]]:
-        """By piece, state and phase: what acts within the sample up to its end, and how far e is from the chord."""
+    def _within(self) -> list[tuple[list[list[Ball]], Kernels]]:
+        """What acts within the sample up to every node, by state and phase."""
+        loop, found = self._problem.loop, []
+        with ctx.workprec(SETUP_BITS):
+            unit = joined([[identity(loop.n), zeros(loop.n, loop.width - loop.n)]])
+            for s in self._nodes:
+                kernels = Kernels(self._problem, exact(s), self._panels, step=False)
+                bounds, lengths = kernels.of(unit)
+                rows = [[x.abs_upper() for x in row] for row in bounds.tolist()]
+                found.append((self._by_state(rows, lengths), kernels))
+        return found
+
+    def _by_state(self, bounds: list[list[Ball]], more: Sequence[float]) -> list[list[Ball]]:
+        """Of rows of bounds those of the states, by phase: what phases have, and what rates of slow signals do."""
+        count, r = len(self._problem.grounds), self._problem.loop.r
+        return [
+            [x + sum(bounds[i][count : count + r], start=arb(more[i])) for x in bounds[i][:count]]
+            for i in self._states
+        ]
+
+    @cached_property
+    def _added(self) -> list[list[list[Added]]]:
+        """By piece, state and phase: what acts within the sample, and how far e is from the chord.
+
+        What acts is near a chord as well, d^2/8 sup of its second derivative; or it grows, and is all there at the end.
+        """
         problem = self._problem
         with ctx.workprec(SETUP_BITS):
             boxes = problem.boxes.tolist()
             for own, x in zip(boxes, problem.start.error, strict=False):  # at k = 0 the start may lie outside
                 own[0] = own[0].max(x.abs_upper() + problem.start.radius)
-            return [self._piece(a, b, arb_mat(boxes)) for a, b in pairwise(self._nodes)]
+            return [self._piece(place, arb_mat(boxes)) for place in range(len(self._nodes) - 1)]
 
-    def _piece(self, a: Fraction, b: Fraction, boxes: arb_mat) -> list[list[int]]:
-        problem, loop, count = self._problem, self._problem.loop, len(self._problem.grounds)
-        kernels = Kernels(problem, exact(b), self._panels, step=False)
-        bounds, lengths = kernels.of(joined([[identity(loop.n), zeros(loop.n, loop.width - loop.n)]]))
+    def _piece(self, place: int, boxes: arb_mat) -> list[list[Added]]:
+        problem, loop = self._problem, self._problem.loop
+        (a, b), ((begun, _), (done, kernels)) = (
+            self._nodes[place : place + 2],
+            self._within[place : place + 2],
+        )
         half, middle, later = exact((b - a) / 2), exact((a + b) / 2), a >= loop.rest
         turned = loop.A * flow(loop.A, between((-half).lower(), half.upper()))[0] * (half * half / 2)
         bent = _rows(sizes(turned * loop.error_rate(middle, later)) * boxes)
         heard = turned * loop.heard_rate(middle, later)
-        noisy, found = measured(problem, heard * loop.N, heard), bounds.tolist()
-        return [
-            [
-                units(
-                    sum(found[i][count : count + loop.r], start=found[i][p]).abs_upper()
-                    + lengths[i]
-                    + bent[i][p]
-                    + noisy[i][p]
-                )
-                for p in range(count)
+        noisy = measured(problem, heard * loop.N, heard)
+        varied = kernels.bent(between(exact(a).lower(), exact(b).upper()), 1) * (half * half / 2)
+        swings = self._by_state(varied.tolist(), [0.0] * loop.n)
+        found: list[list[Added]] = []
+        for i, first, last, swing in zip(self._states, begun, done, swings, strict=True):
+            off = [x + y for x, y in zip(bent[i], noisy[i], strict=True)]
+            chord = [
+                (units(x), units(y), units(z + w)) for x, y, z, w in zip(first, last, swing, off, strict=True)
             ]
-            for i in self._states
-        ]
+            plain = [(0, 0, units(y + w)) for y, w in zip(last, off, strict=True)]
+            found.append([*zip(chord, plain, strict=True)])
+        return found
+
+    def bounds(self, i: int, k: int) -> Iterator[int]:
+        """Of |e_i| on every piece of sample k."""
+        place, p = self._states.index(i), self._problem.phase(k)
+        at = [self._carried[a * len(self._states) + place][k] for a in range(len(self._nodes))]
+        for ends, added in zip(pairwise(at), self._added, strict=True):
+            yield min(max(ends[0] + x, ends[1] + y) + z for x, y, z in added[place][p])
 
     def short(self, i: int) -> int | None:
         """The first sample in which |e_i| is not proven to be below what is claimed."""
-        place = self._states.index(i)
-        at = self._carried[place :: len(self._states)]
-        for k in range(self._problem.last + 1):
-            p = self._problem.phase(k)
-            most = limit(self._problem.grounds[p].stage.half_widths[i])
-            for a, added in enumerate(self._added):
-                if not max(at[a][k], at[a + 1][k]) + added[place][p] < most:
-                    return k
-        return None
+        problem = self._problem
+        most = [limit(own.stage.half_widths[i]) for own in problem.grounds]
+        samples = range(problem.last + 1)
+        return next((k for k in samples if not max(self.bounds(i, k)) < most[problem.phase(k)]), None)
 
 
 class Inequalities:

@@ -182,8 +182,14 @@ class Remainders:
         return [most(own[j] for own in found) for j in range(self._m)]
 
     def _timed(self) -> Iterator[tuple[Window, Ball]]:
-        """Windows with the times of h there."""
-        for own in self._windows:
+        """Windows with the times of h there; one window is enough for an h that is free of the states."""
+        free = names(self._spec.uncertainty.h or ()).isdisjoint(self._spec.plant.states)
+        anywhere = [own for own in self._windows if own.time is None]
+        for own in (
+            [*anywhere[:1], *(own for own in self._windows if own.time is not None)]
+            if free
+            else self._windows
+        ):
             for time in self._times if own.time is None else (own.time,):
                 yield own, time
 

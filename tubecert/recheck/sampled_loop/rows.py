@@ -14,6 +14,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import accumulate, pairwise
 
 from flint import arb, arb_mat, ctx
@@ -26,7 +27,7 @@ from tubecert.recheck.sampled_loop.record import Stage
 
 SETUP_BITS = 128  # of matrices: rows are carried in those of the context
 _UNIT_BITS = 160  # sums are whole multiples of 2^-160
-_ROUNDED = 1 + 1e-12  # what floats lose in a sum of at most 100 squares, and its root
+_ROUNDED = 1 + 1e-12  # what floats lose in a length, and in a sum of a hundred of them
 _TELLS = 64  # lags
 _MOST_TERMS = 8_000_000  # kept: outputs x phases x lags
 
@@ -106,8 +107,7 @@ def limit(q: Fraction) -> int:
 
 def long(row: Sequence[Ball]) -> float:
     """At least the Euclidean length, in floats."""
-    total = sum(x * x for x in (float(x.abs_upper()) for x in row))
-    return math.sqrt(total) * _ROUNDED + 1e-150
+    return math.hypot(*[float(x.abs_upper()) for x in row]) * _ROUNDED + 1e-150
 
 
 class Kernels:
@@ -210,9 +210,15 @@ class Kernels:
         self._add(joined(sudden), self._of_slow(1, signals.slow), weight)
 
     def _panel(self, ages: Ball, d: Ball) -> None:
-        """What the chord of one panel leaves, added to the rest: second derivatives over all its ages."""
-        loop, signals, moved = self._loop, self._signals, flow(self._loop.A, ages)[0]
-        slow = loop.A * moved
+        """What the chord of one panel leaves, added to the rest."""
+        below = zeros(self._loop.width - self._loop.n, self.width)
+        self._rest = self._rest + around_zero(joined([[self.bent(ages, 2) * (d * d * d / 12)], [below]]))
+
+    def bent(self, ages: Ball, order: int) -> arb_mat:
+        """sup |d^order Gamma/ds^order| times amplitudes over ages, order 1 or 2, (n, width)."""
+        loop, signals, slow = self._loop, self._signals, flow(self._loop.A, ages)[0]
+        for _ in range(order - 1):
+            slow = loop.A * slow
         fast = loop.A * slow
         bent = fast * self._entries
         bends = joined([[bent, slow * loop.H, fast * loop.H]])
@@ -222,8 +228,7 @@ class Kernels:
             lengths = [size * long(row[columns.start : columns.stop]) for row in bent.tolist()]
             flat = [x if j < len(self._grounds) else arb(0) for x in lengths for j in range(self.width)]
             own = own + arb_mat(loop.n, self.width, flat)
-        below = zeros(loop.width - loop.n, self.width)
-        self._rest = self._rest + around_zero(joined([[own * (d * d * d / 12)], [below]]))
+        return own
 
 
 @dataclass(frozen=True)
@@ -241,22 +246,28 @@ class Sums:
     gathered: list[list[list[int]]]
     tails: list[list[int]]
 
-    def upto(self, f: int, k: int) -> int:
-        """|c xi_k|."""
-        if k == 0:
-            return self.first[f]
-        lags, own, begins = (
-            min(k, self.lags),
-            self.gathered[f],
-            [ground.start for ground in self.problem.grounds],
-        )
-        early = k <= self.lags
-        total = self.started[f][k - 1] if early else self.tails[f][self.problem.phase(k - lags)]
-        for p, (begin, end) in enumerate(pairwise([*begins, max(k, begins[-1])])):
-            low, high = max(0, k - end), min(lags, k - begin)  # lags i with begin <= k - 1 - i < end
-            if low < high:
-                total += own[p][high] - own[p][low]
-        return total
+    @cached_property
+    def _spans(self) -> list[list[tuple[int, int, int]]]:
+        """By sample: which lags, from one to another, are of samples of which phase."""
+        begins, found = [own.start for own in self.problem.grounds], []
+        for k in range(self.problem.last + 1):
+            parts, lags = [], min(k, self.lags)
+            for p, (begin, end) in enumerate(pairwise([*begins, max(k, begins[-1])])):
+                low, high = max(0, k - end), min(lags, k - begin)  # lags i with begin <= k - 1 - i < end
+                if low < high:
+                    parts.append((p, low, high))
+            found.append(parts)
+        return found
+
+    def of(self, f: int) -> list[int]:
+        """|c xi_k| of an output, k = 0 .. last."""
+        own, tails, phase = self.gathered[f], self.tails[f], self.problem.phase
+        late = (tails[phase(k - self.lags)] for k in range(self.lags + 1, self.problem.last + 1))
+        begun = [self.first[f], *self.started[f], *late]
+        return [
+            x + sum(own[p][high] - own[p][low] for p, low, high in parts)
+            for x, parts in zip(begun, self._spans, strict=True)
+        ]
 
 
 class LateError(ArithmeticError):
