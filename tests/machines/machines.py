@@ -6,8 +6,9 @@ parts of a sample, the worst signals by their signs and, where a signal has a si
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise, product
 from typing import NamedTuple
 
@@ -58,11 +59,6 @@ class Machine:
     def sizes(self) -> tuple[int, int, int]:
         """n, m, k."""
         return len(self.A), self.B.shape[1], self.E.shape[1]
-
-    @property
-    def corners(self) -> tuple[float, ...]:
-        """What p may be at the ends."""
-        return self.range if self.varied else (1.0,)
 
     def at(self, p: float) -> tuple[Array, Array]:
         """A and B of a parameter."""
@@ -166,13 +162,6 @@ class Signals(NamedTuple):
     start: Array
 
 
-class Run(NamedTuple):
-    """e at the nodes, (K, s + 1, n), and delta, (K, m)."""
-
-    e: Array
-    delta: Array
-
-
 @dataclass(frozen=True)
 class Attack:
     """One machine, its tables and one value of its parameter, on parts of a sample of which tau' is an end."""
@@ -182,13 +171,12 @@ class Attack:
     p: float
     samples: int
     fine: int = 2
-    parts: list[float] = field(init=False)
 
-    def __post_init__(self) -> None:
-        rest = self.machine.delay % self.machine.sample_time
-        ends = sorted({Fraction(0), rest, self.machine.sample_time})
-        parts = [float(b - a) / self.fine for a, b in pairwise(ends) for _ in range(self.fine)]
-        object.__setattr__(self, "parts", parts)
+    @cached_property
+    def parts(self) -> list[float]:
+        """Their lengths."""
+        ends = sorted({Fraction(0), self.machine.delay % self.machine.sample_time, self.machine.sample_time})
+        return [float(b - a) / self.fine for a, b in pairwise(ends) for _ in range(self.fine)]
 
     @property
     def whole(self) -> int:
@@ -263,7 +251,8 @@ class Attack:
         """The most that an output at sample k can be, with a sign, beside what is known, and the signals that do it."""
         lags = slice(k, None, -1)
         s = len(self.parts)
-        noise, value = _largest(kernels.noise[lags, row], self._noise())
+        sizes = np.array(self.machine.noise or (0.0,))
+        noise, value = _largest(kernels.noise[lags, row], (sizes, len(sizes) == 1))
         gusts, at = np.zeros((k + 1, s, kernels.gusts.shape[-1])), 0
         for columns, sizes, length in self.sudden:
             own = slice(at, at := at + columns.shape[1])
@@ -286,10 +275,6 @@ class Attack:
         known = self.machine.start if self.machine.kind == "point" and self.machine.start else [0.0] * n
         return Signals(np.zeros((count, n)), gusts, eta, np.array(known))
 
-    def _noise(self) -> tuple[Array, bool]:
-        sizes = np.array(self.machine.noise or (0.0,))
-        return sizes, len(sizes) == 1
-
     def _start(self, row: Array, sign: float) -> tuple[Array, float]:
         given = np.array(self.machine.start or (0.0,) * len(row))
         if self.machine.kind == "point":
@@ -299,8 +284,8 @@ class Attack:
         size = float(np.linalg.norm(row))
         return sign * row / (size or 1.0) * given[0], size * given[0]
 
-    def run(self, signals: Signals, steps: int = 4) -> Run:
-        """The machine with its true plant under these signals, by Runge and Kutta."""
+    def run(self, signals: Signals, steps: int = 4) -> tuple[Array, Array]:
+        """e at the nodes, (K, s + 1, n), and delta, (K, m), of the true plant, by Runge and Kutta."""
         m, t, ts, inputs = self.machine, self.tables, float(self.machine.sample_time), self.machine.sizes[1]
         n, count = len(m.A), len(signals.noise)
         gusts, H = self.columns
@@ -333,7 +318,7 @@ class Attack:
                 x, plan = y[:n], y[n:] if m.family else m.planned(np.array([now]))[0][0]
                 e[k, part + 1] = x - plan
                 assert np.abs(plan).max() <= REACH, "a plan that is none of the family"
-        return Run(e=e, delta=delta)
+        return e, delta
 
     def input(self, t: float, command: int) -> Array:
         """u*(t), where a command acts: of a family a triangle, or what the planner has drawn for the command."""
@@ -431,17 +416,16 @@ def met(
     """
     found = []
     n, m, _ = machine.sizes
-    for p in machine.corners:
+    for p in machine.range if machine.varied else (1.0,):
         attack = Attack(machine, tables, p, max(samples))
         kernels, s = attack.kernels(), len(attack.parts)
-        still = attack.run(attack.still(kernels))
+        errors, deltas = attack.run(attack.still(kernels))
         rows = [*range(n * (s // 2), n * (s // 2 + 1)), *range(n * (s - 1), n * s + m)]
         for k, row in product(samples, rows):
-            known = still.delta[k, row - n * s] if row >= n * s else still.e[k, row // n + 1, row % n]
+            known = deltas[k, row - n * s] if row >= n * s else errors[k, row // n + 1, row % n]
             limit, signals = attack.worst(kernels, k, row, sign=1.0 if known >= 0 else -1.0)
-            run = attack.run(signals)
-            deltas, errors = np.abs(run.delta[k, row - n * s :]), np.abs(run.e[k, row // n + 1 :])
-            attained = float(deltas[0] if row >= n * s else errors[0, row % n])
+            e, delta = attack.run(signals)
+            attained = abs(float(delta[k, row - n * s] if row >= n * s else e[k, row // n + 1, row % n]))
             name = f"u{row - n * s + 1}" if row >= n * s else f"x{row % n + 1}"
             most = attained if machine.bent else abs(known) + limit
             found.append(Met(k, name, most, attained, proven(k, name)))
@@ -483,17 +467,17 @@ def drawn(seed: int) -> Machine:
     grows = float(np.linalg.eigvals(A).real.max())
     alone = rng.random() < 0.2
     most = -0.5 if alone else float(rng.uniform(-1, 0.25 / float(ts + delay)))
-    A = _decimal(A + (min(most, 1.5) - grows) * np.eye(n))
-    B = _decimal(rng.normal(size=(n, m)) + np.eye(n)[:, :m])
+    A = np.round(A + (min(most, 1.5) - grows) * np.eye(n), 2)
+    B = np.round(rng.normal(size=(n, m)) + np.eye(n)[:, :m], 2)
     k = int(rng.integers(0, 3))
-    E = _decimal(rng.normal(size=(n, k)))
+    E = np.round(rng.normal(size=(n, k)), 2)
     own: dict[str, object] = {"controller": "none" if alone else "auto"}
     own |= {"hold": pick("middle", "left", "continuous")}
     if rng.random() < 0.8:
-        own["noise"] = tuple(_decimal(rng.uniform(0.001, 0.02, size=pick(1, n)), 4).tolist())
+        own["noise"] = tuple(np.round(rng.uniform(0.001, 0.02, size=pick(1, n)), 4).tolist())
     if k:
         length = bool(rng.random() < 0.5)
-        own |= {"wind": tuple(_decimal(rng.uniform(0.01, 0.1, size=1 if length else k)).tolist())}
+        own |= {"wind": tuple(np.round(rng.uniform(0.01, 0.1, size=1 if length else k), 2).tolist())}
         own |= {"wind_is_length": length, "wind_rate": pick(None, None, 0.2)}
     if rng.random() < 0.6:
         own |= {"h": pick(0.05, 0.1), "h_rate": pick(0.1, 0.5, 3.0)}
@@ -508,7 +492,7 @@ def drawn(seed: int) -> Machine:
     if rng.random() < 0.3:
         own["bent"] = ((int(rng.integers(n)), int(rng.integers(n)), pick(-0.5, 0.3)),)
     own["kind"] = "ball" if "family" in own else pick("point", "box", "ball")
-    size = _decimal(rng.uniform(0.0, 0.1, size=1 if own["kind"] == "ball" else n)) + 0.01
+    size = np.round(rng.uniform(0.0, 0.1, size=1 if own["kind"] == "ball" else n), 2) + 0.01
     own["start"] = tuple(np.round(size, 2).tolist())
     return Machine(A=A, B=B, E=E, sample_time=ts, delay=delay, **own)  # type: ignore[arg-type]
 
@@ -516,7 +500,7 @@ def drawn(seed: int) -> Machine:
 def _wave(A: Array, B: Array, pick, rng: np.random.Generator) -> dict[str, object]:
     w = float(pick(0.5, 1.0, 2.0))
     n, m = B.shape
-    u = _decimal(rng.uniform(-0.3, 0.3, size=(m, 2)))
+    u = np.round(rng.uniform(-0.3, 0.3, size=(m, 2)), 2)
     # x = a sin + b cos with x' = A x + B u: (A, w; -w, A) (a; b) = -B (of sin; of cos)
     whole = np.block([[A, w * np.eye(n)], [-w * np.eye(n), A]])
     x = np.linalg.solve(whole, -np.concatenate([B @ u[:, 0], B @ u[:, 1]])).reshape(2, n).T
@@ -526,7 +510,3 @@ def _wave(A: Array, B: Array, pick, rng: np.random.Generator) -> dict[str, objec
         "horizon": float(np.ceil(2 * np.pi / w)),
         "afterwards": pick("nothing", "repeat", "repeat"),
     }
-
-
-def _decimal(values: Array, digits: int = 2) -> Array:
-    return np.asarray(np.round(values, digits))
