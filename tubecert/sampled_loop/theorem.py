@@ -2,7 +2,7 @@
 
 For every output o = c xi + direct terms and every sample k, b_o(k) bounds |o| if every earlier error was inside the
 tube; (a) b of e_i < W_i on all of every sample, (b) b of delta_j <= U_j, (c) b of zeta <= Z. Then no first exit is
-possible (theory of the sampled loop, theorem 5). Who proposed tables, tube and recipe does not matter. Trusted: yes.
+possible (theory of the sampled loop, section 5). Who proposed tables, tube and recipe does not matter. Trusted: yes.
 """
 
 from __future__ import annotations

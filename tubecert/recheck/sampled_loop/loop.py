@@ -1,7 +1,7 @@
 """The linear sampled loop of an error equation, enclosed: its matrices over one sample, and at times within one.
 
 xi = (e, zeta, v_1..v_b, eta): the error, the controller's memory, the deltas of the b samples before (which the delay
-keeps waiting), the slow signals. Implements: discrete certificate (D.5)-(D.7) for a delay of q samples and a rest.
+keeps waiting), the slow signals. Implements: theory of the sampled loop, section 3.
 """
 
 from __future__ import annotations
