@@ -75,17 +75,21 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
 
 
 def _tube(plant: Plant, theta: Array) -> tuple[Array, Array]:
-    """W, U of rounded tables by the fixed point, followed to its end; or `NoDesign`."""
+    """W, U of rounded tables by the fixed point, followed to its end; or `NoDesign`.
+
+    A tube that falls after a start has a smaller remainder than one of its first size: with a start, none is refused.
+    """
     n, m = plant.B.shape
     if (response := respond(plant, sample_of(plant), theta, SUMMED)) is None:
         raise NoDesign("no_design")
     alone = sizes(plant, response.ever + response.gain @ rest_at(plant, np.zeros(n + m)))
     unfound.refuse_inputs(plant, alone[n:])
     size, settled = settle(plant, response.gain, response.ever, 400)
-    if not settled:
-        worst = int(np.argmax(size[:n] / alone[:n]))
-        raise NoDesign("no_fixed_point", worst, float(size[worst]), float(alone[worst]))
-    unfound.refuse_inputs(plant, size[n:])
+    if not plant.start.any():
+        if not settled:
+            worst = int(np.argmax(size[:n] / alone[:n]))
+            raise NoDesign("no_fixed_point", worst, float(size[worst]), float(alone[worst]))
+        unfound.refuse_inputs(plant, size[n:])
     return np.maximum(size[:n], plant.start), size[n:]
 
 
@@ -144,14 +148,17 @@ class _Search:
 
     def refer(self, weights: Array) -> bool:
         """Take these weights' widths, or wishes, as the reference; whether that makes any difference."""
-        if (reached := self._reach(weights, 0)) is None:
+        alone, grown = self._reach(weights, 0), self._reach(weights, STEPS)
+        if alone is None or grown is None:
             return False
-        response, W, U = reached
         wished = np.isfinite(self.plant.wishes)
-        grown = response.gain @ (rest_at(self.plant, np.r_[W[0], U]) - self.constant)
-        self.reference = W * (UNASKED if wished.any() else 1.0)
+        grows = any(
+            (with_rest > (1 + 1e-4) * without).any()
+            for with_rest, without in zip(grown[1:], alone[1:], strict=True)
+        )
+        self.reference = np.minimum(grown[1], 1e3 * alone[1]) * (UNASKED if wished.any() else 1.0)
         self.reference[:, wished] = WISH * self.plant.wishes[wished]
-        return bool(wished.any() or (grown > 1e-4 * response.ever).any())
+        return bool(wished.any() or grows)
 
     def meets_wishes(self, weights: Array) -> bool:
         """Whether the tube of these weights is as narrow as wished."""

@@ -2,7 +2,7 @@
 
 b(k) bounds an output at sample k if the loop has kept to its boxes before; below what is claimed at every k there is no
 first exit. Between two nodes of a sample e is near a chord, d^2/8 sup|c''|. Implements: theory of the sampled loop,
-theorem 5.
+section 5.
 """
 
 from __future__ import annotations
