@@ -112,7 +112,9 @@ class Inequalities:
         """The same with fewer lags."""
         cuts = tuple(tuple(min(cut, lags) for cut in row) for row in self.recipe.cuts)
         recipe = replace(self.recipe, lags=lags, cuts=cuts)
-        return Inequalities(self.controller, recipe, self.starts, self.responses.shorter(lags), self.remainders)
+        return Inequalities(
+            self.controller, recipe, self.starts, self.responses.shorter(lags), self.remainders
+        )
 
     def _cut(self, recipe: Recipe) -> None:
         self.recipe = recipe
