@@ -190,7 +190,6 @@ def _row(case: Case, folder: Path, runs: int) -> list[str]:
     played = _command(
         "simulate",
         spec,
-        *sets,
         "--certificate",
         certificate,
         "--runs",
