@@ -153,7 +153,10 @@ def largest_jump(loop: Loop) -> Array:
     aligned = all(((t - loop.rest) / loop.sample_time).denominator == 1 for t, _ in jumps)
     if not jumps or (loop.hold == "middle" and aligned):
         return np.zeros(loop.inputs)
-    closest = min((b - a for (a, _), (b, _) in pairwise(jumps)), default=loop.sample_time)
+    times = [t for t, _ in jumps]
+    if loop.afterwards == "repeat":
+        times.append(knots.t[-1] + times[0])
+    closest = min((b - a for a, b in pairwise(times)), default=loop.sample_time)
     met = int(loop.sample_time / closest) + 1
     return np.array(
         [fraction_bounds(met * max(sizes[j] for _, sizes in jumps))[1] for j in range(loop.inputs)]

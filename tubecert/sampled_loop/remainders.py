@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
@@ -167,8 +166,7 @@ class Remainders:
         """|h_j| by input: of components of eta, or of what is sudden; (m,)."""
         found = np.zeros(self.loop.inputs)
         if self.loop.jumps:
-            bounds = self.loop.spec.uncertainty.bounds
-            found[:] = 0.0 if bounds is None or bounds.h is None else fraction_bounds(bounds.h)[1]
+            found[:] = self._declared()[0]
         else:
             found[list(self.loop.matched)] = size[: len(self.loop.matched)]
         return found
@@ -190,23 +188,22 @@ class Remainders:
         """sup |h_j(t, x* + e) - h_j(t, x*)|, (m,)."""
         loop = self.loop
         found = np.zeros(loop.inputs)
-        bounds = loop.spec.uncertainty.bounds
         if loop.jumps:
             return found
-        if bounds is not None and bounds.h_x is not None:
+        if loop.model.h is None:
             length = np.sqrt(np.sum(W * W)) * SUMMED + 1e-150
-            found[:] = np.where(self._acts, fraction_bounds(bounds.h_x)[1] * length * (1 + 1e-15), 0.0)
-            if loop.model.h is None:
-                return found
+            return np.asarray(found + self._declared()[1] * length * (1 + 1e-15))
         n = loop.states
         steep = self._h_run(self._h_slopes, _wider(self._timed.x, W)).magnitude
         rows = total(np.ascontiguousarray(steep.reshape(loop.inputs, n + 1, -1)[:, :n].swapaxes(1, 2)), W)
-        own = np.asarray(np.max(rows, axis=1))
-        return own if bounds is None or bounds.h_x is None else np.minimum(own, found)
+        return np.asarray(np.max(rows, axis=1))
 
-    @property
-    def _acts(self) -> NDArray[np.bool_]:
-        return np.isin(np.arange(self.loop.inputs), self.loop.matched)
+    def _declared(self) -> tuple[float, float, float]:
+        """Bounds of |h|, of its slope and of its rate, of an h that is not given otherwise."""
+        bounds = self.loop.spec.uncertainty.bounds
+        given = (None, None, None) if bounds is None else (bounds.h, bounds.h_x, bounds.h_t)
+        h, steep, fast = (np.inf if each is None else fraction_bounds(each)[1] for each in given)
+        return h, steep, fast
 
     # -- the components of eta ---------------------------------------------------------------------------------------
 
@@ -229,23 +226,15 @@ class Remainders:
 
     def _uncertainty(self, W: Array) -> tuple[Array, Array, Array]:
         """Of h: its size on the tube, its rate along the plan, its size on the plan at time 0."""
-        loop, own = self.loop, list(self.loop.matched)
-        bounds = loop.spec.uncertainty.bounds
-        found = []
-        if loop.model.h is not None:
-            size = self._h_run(self._h, _wider(self._timed.x, W)).magnitude.max(axis=1)[own]
-            first = self._h_first().magnitude.max(axis=1)[own]
-            found.append((size, self._h_rate[own], first))
-        if bounds is not None and bounds.h is not None and bounds.h_x is not None and bounds.h_t is not None:
-            h, steep, fast = (fraction_bounds(each)[1] for each in (bounds.h, bounds.h_x, bounds.h_t))
+        own = list(self.loop.matched)
+        if self.loop.model.h is None:
+            h, steep, fast = self._declared()
             speed = self.speed.magnitude
             length = float(np.max(np.sqrt(np.sum(speed * speed, axis=0)))) * SUMMED
             size = np.full(len(own), h)
-            found.append((size, np.full(len(own), (fast + steep * length) * (1 + 1e-15)), size))
-        if len(found) == 1:
-            return found[0]
-        size, rate, first = (np.minimum(a, b) for a, b in zip(*found, strict=True))
-        return size, rate, first
+            return size, np.full(len(own), (fast + steep * length) * (1 + 1e-15)), size
+        size = self._h_run(self._h, _wider(self._timed.x, W)).magnitude.max(axis=1)[own]
+        return size, self._h_rate[own], self._h_first().magnitude.max(axis=1)[own]
 
     @cached_property
     def _h_rate(self) -> Array:
@@ -259,7 +248,10 @@ class Remainders:
             whole = steep[j * (n + 1) + n]
             for i in range(n):
                 whole = whole + steep[j * (n + 1) + i] * speed[i]
-            rows.append(whole.sanitised().magnitude.max())
+            rest = (
+                steep[j * (n + 1) + n] if self.loop.afterwards == "rest" else whole
+            )  # where x*' = 0, h_t alone
+            rows.append(whole.sanitised().hull(rest.sanitised()).magnitude.max())
         return np.array(rows)
 
     def _h_first(self) -> Interval:

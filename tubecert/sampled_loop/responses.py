@@ -47,13 +47,16 @@ class Direct:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """A part of a sample between two nodes, and how far e is there from the chord (theory, eq. 3.4)."""
+    """A part of a sample between two nodes, and how far e and its direct terms are from chords (theory, eq. 3.4)."""
 
     first: int
     core: Array
     eta: Array
     noise: Array
     rounding: Array
+    wind: Array
+    rho: Array
+    rate: Array
 
 
 class Dynamics:
@@ -326,7 +329,17 @@ class Responses:
         d = fraction_bounds(b - a)[1]
         share = d * d / 8 * (np.abs(self.loop.A) @ swelling(self.loop.A, (b - a) / 2)) * SUMMED
         parts = (slope.core, slope.eta, slope.noise, slope.rounding)
-        return Piece(first, *(share @ own.above * SUMMED for own in parts))
+        phi, _ = self.dynamics.exponential.at((a + b) / 2)
+        turned = d * d / 8 * swelling(self.loop.A, (b - a) / 2) * SUMMED
+        R = np.hstack([np.eye(self.loop.states), self.loop.B])
+        core, eta, noise, rounding, rho = (
+            share @ own.above * SUMMED for own in (*parts, phi @ Known.exact(R))
+        )
+        wind = np.zeros(self.loop.states)
+        for K, size in self.loop.sudden:
+            wind += weighed(share @ (phi @ Known.exact(K)).above * SUMMED, size)
+        rate = turned @ (phi @ Known.exact(self.loop.H)).above * SUMMED
+        return Piece(first, core, eta, noise, rounding, wind, rho, rate)
 
 
 def weighed(columns: Array, size: Size) -> Array:

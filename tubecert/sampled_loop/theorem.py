@@ -136,7 +136,8 @@ class Inequalities:
         nodes = len(self.responses.nodes)
         e = b[:, : n * nodes].reshape(len(b), nodes, n)
         between = [
-            np.maximum(e[:, own.first], e[:, own.first + 1]) + spread[:, place] + direct[:, own.first + 1]
+            np.maximum(e[:, own.first] + direct[:, own.first], e[:, own.first + 1] + direct[:, own.first + 1])
+            + spread[:, place]
             for place, own in enumerate(self.responses.pieces)
         ]
         within = np.max(between, axis=0) * (1 + 4 * UNIT)
@@ -203,7 +204,7 @@ class Inequalities:
             b += answers[newer] - answers[older] + slack * answers[newer]
         index = np.searchsorted([phase.start for phase in phases], k, side="right") - 1
         direct = np.array([self._within(phase, sizes) for phase in phases])[index]
-        spread = np.array([self._between(phase, off) for phase in phases])[index]
+        spread = np.array([self._between(phase, off, sizes) for phase in phases])[index]
         return b * SUMMED, direct, spread
 
     def causes(self, boxes: Boxes, stage: int) -> Array:
@@ -303,7 +304,7 @@ class Inequalities:
             ]
         )
 
-    def _between(self, phase: _Phase, off: Array) -> Array:
+    def _between(self, phase: _Phase, off: Array, sizes: Sizes) -> Array:
         """How far e may be from the chord between two nodes, (pieces, n)."""
         n, m = self.loop.states, self.loop.inputs
         return np.array(
@@ -314,6 +315,9 @@ class Inequalities:
                     + weighed(own.noise, self.loop.noise)
                     + total(own.noise, off[:n])
                     + total(own.rounding, off[n : n + m])
+                    + own.wind
+                    + total(own.rho, phase.rho)
+                    + total(own.rate, sizes.rate)
                 )
                 * SUMMED
                 for own in self.responses.pieces

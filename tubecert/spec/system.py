@@ -115,6 +115,13 @@ def read_uncertainty(field: Field, names: Names, *, sudden: bool) -> Uncertainty
             'write h: ["0"] if there is no uncertainty, or bounds: {h: ..., h_x: ..., h_t: ...}',
         )
         return None
+    if sudden and len(entries) > 1:
+        field.fail(
+            codes.RANGE,
+            "uncertainty has h and bounds beside hardware",
+            "give one of the two: what h is, or what is known of it",
+        )
+        return None
     h = bounds = None
     if "h" in entries:
         h = entries["h"].terms(len(names.inputs), names.of_uncertainty(), "expressions, one per input")

@@ -165,6 +165,8 @@ def read_uncertainty(node: Node, plant: Plant, *, sudden: bool = False) -> Uncer
     if "bounds" in own:
         own["bounds"].closed(optional=("h", "h_x", "h_t"))
         declared = {key: not_negative(value) for key, value in own["bounds"].items()}
+    if sudden and h is not None and declared:
+        raise node.refused("has both h and bounds, which no sampled loop may have")
     if h is None and not declared.keys() >= ({"h"} if sudden else {"h", "h_x", "h_t"}):
         raise node.refused("must give h, or bounds for h, h_x and h_t")
     return Uncertainty(h, declared, tuple(reader.duties))
