@@ -23,7 +23,6 @@ from tubecert.sampled_loop.theorem import MOST_LAGS, Boxes, Inequalities
 _FORGOTTEN: Final = 1e-4  # what is left of the oldest sample that counts
 _FEWEST: Final = 8
 _PARTS: Final = (2, 4, 8, 16)
-_PANELS: Final = 4  # of a quadrature: what more of them gain is not seen
 _SETTLED: Final = 5e-3  # finer pieces that gain less are not worth it
 _SHORTER: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the lags, where they are enough
 _STEPS: Final = 200
@@ -62,13 +61,15 @@ def propose(
     rough = _inequalities(remainders, controller, recipe)
     found = rough.again(cuts=_cuts(rough))
     boxes = _fixed_point(found, _nothing(found), report)
-    for parts in _PARTS[1:]:
-        recipe = replace(found.recipe, pieces=parts, panels=min(parts, _PANELS))
-        finer = _inequalities(remainders, controller, recipe)
-        gained = np.max(1 - finer.of(boxes).W / np.maximum(found.of(boxes).W, 1e-300))
-        if gained < _SETTLED:
-            break
-        found = finer
+    for pieces in (True, False):
+        for parts in _PARTS[1:]:
+            own = found.recipe
+            recipe = replace(own, pieces=parts) if pieces else replace(own, panels=parts)
+            finer = _inequalities(remainders, controller, recipe)
+            gained = np.max(1 - finer.of(boxes).W / np.maximum(found.of(boxes).W, 1e-300))
+            if gained < _SETTLED:
+                break
+            found = finer
     boxes = _fixed_point(found, boxes, report)
     several, many = _in_stages(found, report)
     if many is not None and (many.W[-1] < _STEADY * many.W.max(axis=0)).any():
