@@ -50,12 +50,36 @@ obstacles:
 SWING = """
 tubecert: 1
 name: swing
-system: {states: [q], inputs: [u], parameters: {c: [0.9, 1.1]}, f: ["-c*q"], B: [[1]]}
+system: {states: [q], inputs: [u], parameters: {c: [0.9, 1.1]}, f: ["-c*q"], B: [["1 + 0.1*q"]]}
 safe_set: {q: [-2, 2]}
 uncertainty: {h: ["0.05*sin(3*t) + 0.02*q"]}
-trajectory: {kind: expressions, x: ["sin(t)"], u: ["cos(t) + sin(t)"], horizon: 6.3, afterwards: repeat}
+trajectory:
+  kind: expressions
+  x: ["sin(t)"]
+  u: ["(cos(t) + sin(t))/(1 + 0.1*sin(t))"]
+  horizon: 6.3
+  afterwards: repeat
 initial_state: {at: [0]}
 hardware: {rate: 10, delay: one sample, hold: left, arithmetic: single}
+"""
+FAMILY = """
+tubecert: 1
+name: family
+system: {states: [y, v], inputs: [a], f: [v, "-0.1*v**3"], B: [[0], [1]]}
+safe_set: {y: [-9, 9], v: [-2, 2]}
+trajectory: {kind: any, x: {y: [-5, 5], v: [-1, 1]}, u: {a: [-1, 1]}, defect: 0.01, input_rate: {a: 2}}
+initial_state: {within: 0.1}
+uncertainty: {bounds: {h: 0.1}}
+hardware: {rate: 20, noise: 0.001}
+"""
+FAR = """
+tubecert: 1
+name: far
+system: {states: [x], inputs: [u], f: ["-x"], B: [[1]]}
+safe_set: {x: [900, 1100]}
+trajectory: {kind: equilibrium, at: [1000], input: [1000]}
+initial_state: {at: [1000]}
+hardware: {rate: 10, delay: 0.05, arithmetic: single}
 """
 
 
@@ -97,11 +121,15 @@ MATRICES = {
     "scalar": ([0.5], [1], [1]),
     "cart": ([0, 1, 0, 0], [0, 1], [0, 1]),
     "swing": ([-1], [1], []),
+    "family": ([0, 1, 0, -0.1], [0, 1], []),
+    "far": ([-1], [1], []),
 }
 GAINS = {
     SCALAR: ([[-3]],),
     CART: ([[-1.5, -2]], [[0.5]], [[0, 0.1]], [[-0.1]]),
     SWING: ([[-2]],),
+    FAMILY: ([[-4, -4]],),
+    FAR: ([[-1]],),
 }
 
 

@@ -154,6 +154,35 @@ def test_no_signal_does_more_than_the_sums_say_and_the_worst_does_nearly_as_much
     assert max(shares) > 0.9
 
 
+def plain(A, E, start: list[float], wind: float) -> Inequalities:
+    """e' = A e + E w from a point, nothing else; samples of 1 s, one piece, one panel, the box of xi small."""
+    n = len(A)
+    nothing = {"F": arb_mat(0, 0), "G": arb_mat(0, n), "M": arb_mat(1, 0), "N": arb_mat(1, n)}
+    loop = Loop(
+        A=arb_mat(A), B=arb_mat(n, 1), H=arb_mat(n, 0), **nothing, sample=Fraction(1), delay=Fraction(0)
+    )
+    winds = [(arb_mat([[x] for x in E]), [arb(wind)], False)]
+    signals = Signals([arb(0)] * n, noise_length=False, winds=winds, slow=[], rates=[], first=[])
+    stage = Stage(0, (Fraction(1),) * n, (Fraction(1),), ())
+    ground = Ground(0, stage, *[[arb(0)] * k for k in (n, 1, n, 1, 0)], [arb("1e-9")] * n)
+    recipe = Recipe(2, ((),) * (n + 1), 1, 1, 1, True)
+    return Inequalities(Problem(loop, signals, Start([*map(arb, start)], arb(0)), [ground], 2, 2), recipe)
+
+
+def test_an_error_between_samples_is_seen():
+    """sin(pi t) is 0 at every sample, from a start outside of the box; so is what a wind does in the trapezoid."""
+    swinging = [[0.0, 1.0], [-(np.pi**2), 0.0]]
+    assert max(plain(swinging, [0, 0], [0.0, np.pi], 0.0)._first.bounds(0, 0)) * 2.0**-160 >= 1
+    (within,) = plain(swinging, [0, 1], [0.0, 0.0], 1.0)._first.bounds(0, 1)
+    assert within * 2.0**-160 >= 2 / np.pi**2
+
+
+def test_what_acts_within_a_sample_may_be_above_its_chord():
+    """p' = v + w, v' = -w from (1, -.5): sup |p(s)| = 1 - s/2 + s - s^2/2 is 1 at both ends, and 1.125 between."""
+    (found,) = plain([[0.0, 1.0], [0.0, 0.0]], [1, -1], [1.0, -0.5], 1.0)._first.bounds(0, 0)
+    assert 1.125 <= found * 2.0**-160 < 1.3
+
+
 def test_phases_hold_the_commands_that_wait():
     stages = [Stage(k, (Fraction(1),), (Fraction(u),), ()) for k, u in ((0, 5), (10, 3), (11, 1))]
     found = [(begin, stage.start, most) for begin, stage, (most,) in phases_of(stages, 2)]
