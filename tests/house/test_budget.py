@@ -11,38 +11,40 @@ PACKAGE = Path(tubecert.__file__).parent
 TESTS = Path(__file__).parents[1]
 OWN = "."  # the modules beside the rooms
 BUDGET = {  # room: lines, modules, classes
-    ".": (1977, 18, 31),
+    ".": (1981, 18, 31),
     "bounds": (2374, 15, 21),
     "certificate": (1505, 10, 45),
-    "checking": (491, 5, 5),
+    "checking": (490, 5, 5),
     "claims": (829, 12, 75),
-    "cli": (3635, 34, 23),
+    "cli": (3705, 34, 23),
     "conditions": (1688, 16, 22),
+    "controller": (587, 5, 3),
     "enclosure": (2941, 18, 41),
     "expression": (2560, 15, 16),
     "kinds": (683, 7, 19),
-    "library": (3112, 21, 29),
+    "library": (3347, 22, 30),
     "lint": (1094, 8, 3),
-    "loop_design": (1239, 10, 9),
+    "loop_design": (1274, 10, 9),
     "metric": (527, 3, 4),
     "model": (556, 5, 1),
     "pipeline": (2320, 16, 13),
     "planner": (708, 5, 10),
-    "recheck": (11550, 79, 123),
-    "report": (6215, 47, 44),
-    "sampled_loop": (2136, 11, 34),
+    "recheck": (14100, 91, 152),
+    "report": (6308, 48, 44),
+    "sampled_loop": (2165, 11, 34),
     "search": (961, 8, 6),
-    "simulate": (6189, 36, 92),
-    "spec": (5670, 30, 42),
+    "simulate": (6190, 36, 92),
+    "simulation": (1510, 11, 22),
+    "spec": (5677, 30, 42),
     "stages": (1309, 10, 13),
     "sweep": (519, 5, 8),
     "synthesis": (4017, 28, 37),
     "trajectory": (949, 7, 8),
     "tube": (647, 4, 6),
-    "words": (974, 7, 0),
+    "words": (988, 7, 0),
 }  # fmt: skip
-FUNCTIONS = 4330  # of the package
-TEST_LINES = 38_500
+FUNCTIONS = 4950  # of the package
+TEST_LINES = 42_500
 
 
 def counted() -> dict[str, tuple[int, int, int]]:
