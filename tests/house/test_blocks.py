@@ -279,7 +279,8 @@ def completed(group: list[tuple[str, str]], base: list[tuple[str, str]]) -> Iter
     keys = dict(group)
     for key, text in base:
         if key not in keys:
-            yield text
+            if "hardware" not in keys or key not in ("metric", "tube"):  # beside which there is no metric
+                yield text
         elif key == "system":  # what the system of the block leaves out
             own = yaml.load(keys[key], Loader=yaml.BaseLoader)[key]
             rest = {

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from machines import double, plant, pvtol, scalar
+from plants import double, plant, pvtol, scalar
 
 from tubecert.loop_design.design import design
 from tubecert.loop_design.unfound import NoDesign

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from machines import plant, scalar
+from plants import plant, scalar
 from scipy.linalg import expm
 
 from tubecert.loop_design.widths import respond, sample_of, settle

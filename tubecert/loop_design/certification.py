@@ -258,9 +258,18 @@ def plant_of(question: Question, narrow: Array) -> Plant:
         wind_ball=len(winds) == 1 and winds[0][1].length,
         room=room,
         wishes=np.array([float(asked.get(name, np.inf)) for name in loop.model.states]),
+        space=_space(loop, own),
         start=loop.start.reach,
         remainder=fitted(Remainders(loop, _FEW), _reach(loop, room)),
     )
+
+
+def _space(loop: Loop, remainders: Remainders) -> Array:
+    """How far the plan is from the ends of the safe set, (n,)."""
+    ends = np.array([(float(low), float(high)) for low, high in loop.spec.safe_set])
+    x = remainders.cells.x
+    room = np.minimum(ends[:, 1] - x.hi.max(axis=0), x.lo.min(axis=0) - ends[:, 0])
+    return np.asarray(np.maximum(room, 1e-300))
 
 
 def _reach(loop: Loop, room: Array) -> Array:

@@ -29,7 +29,7 @@ UNSTABLE = 1e9
 ROOM = 0.95  # of an input may be used without a price: rigorous bounds are a little wider
 FREE = 0.05  # what an input that nothing limits counts, beside the widths
 SLOW = 0.03  # what lags count: twice as many must make the tube 2 % smaller
-LATER = 0.1  # what the long run counts beside the tube for ever, where the start makes them differ
+LATER = 0.5  # what the long run counts beside the tube for ever, where the start makes them differ
 WISH = 0.9  # of a half-width that is wished is aimed at
 UNASKED = 2.0  # times its first half-width is what a state may have for another one's wish
 
@@ -123,8 +123,8 @@ class _Search:
     def value(self, weights: Array) -> float:
         """What the search makes small.
 
-        The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs leave
-        their room or cost nothing, and for loops that forget slowly.
+        The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs or the
+        tube leave their room, or inputs cost nothing, and for loops that forget slowly.
         """
         if (reached := self._reach(weights, 0 if self.reference is None else STEPS)) is None:
             return UNSTABLE
@@ -133,7 +133,7 @@ class _Search:
             value = np.exp(self.counts @ np.log(np.maximum(W, 1e-30)).sum(axis=1))
         else:
             value = (self.counts @ ((W / self.reference) ** 8).sum(axis=1)) ** (1 / 8)
-        over = np.maximum(0.0, U / self.plant.room - ROOM)
+        over = np.maximum(0.0, np.r_[U / self.plant.room, W[0] / self.plant.space] - ROOM)
         free = np.where(np.isinf(self.plant.room), U, 1.0)
         return float(value * (1 + 5 * over + 50 * over**2).prod() * free.prod() ** FREE * response.lags**SLOW)
 

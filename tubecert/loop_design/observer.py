@@ -51,6 +51,7 @@ def in_units(plant: Plant, units: Units) -> Plant:
         A=plant.A * s / s[:, None], B=plant.B * u / s[:, None], H=plant.H * a / s[:, None],
         E=plant.E * plant.wind / s[:, None], wind=np.ones_like(plant.wind), noise=plant.noise / s,
         magnitude=plant.magnitude / a, rate=plant.rate / a, room=plant.room / u, wishes=plant.wishes / s,
+        space=plant.space / s,
         start=plant.start / s, eta_start=plant.eta_start / a,
         remainder=lambda W, U: plant.remainder(W * s, U * u) / np.r_[s, u],
     )  # fmt: skip

@@ -18,9 +18,9 @@ class Plant:
     A (n, n), B (n, m), H (n, r), E (n, k); `sample_time` and `delay` in s. Bounds: |n_i| <= noise_i (n,), or the
     length of n_i / noise_i <= 1 if `noise_ball`; |eta_i| <= magnitude_i, |eta_i'| <= rate_i (r,); |w_i| <= wind_i
     (k,), or the length of w_i / wind_i <= 1 if `wind_ball`; at the start |e_i| <= start_i (n,), |eta_i| <= eta_start_i
-    (r,). `room` (m,): how far delta may go, inf where nothing limits it; `wishes` (n,): half-widths asked for, inf
-    where nothing is. `remainder`: W (n,), U (m,) -> the bound of |rho| (n + m,) while |e| < W, |delta| <= U; it grows
-    with both.
+    (r,). `room` (m,): how far delta may go, inf where nothing limits it; `space` (n,): how far e may go at all;
+    `wishes` (n,): half-widths asked for, inf where nothing is. `remainder`: W (n,), U (m,) -> the bound of |rho|
+    (n + m,) while |e| < W, |delta| <= U; it grows with both.
     """
 
     A: Array
@@ -37,6 +37,7 @@ class Plant:
     wind_ball: bool
     room: Array
     wishes: Array
+    space: Array
     start: Array
     eta_start: Array
     remainder: Callable[[Array, Array], Array]

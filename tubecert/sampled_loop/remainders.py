@@ -90,13 +90,12 @@ class Remainders:
 
     @property
     def _holding(self) -> Array:
-        loop, nothing = self.loop, np.zeros(self.loop.inputs)
-        family = isinstance(loop.plan, Family)
-        if loop.hold == "continuous":
-            return nothing
+        loop = self.loop
         rate = steepness(loop, len(self.cells))
+        if loop.hold == "continuous" or (rate is None and isinstance(loop.plan, Family)):
+            return np.zeros(loop.inputs)
         if rate is None:
-            return nothing if family else largest_jump(loop)
+            return largest_jump(loop)
         span = fraction_bounds(loop.sample_time if loop.hold == "left" else loop.sample_time / 2)[1]
         return np.asarray(rate * span * (1 + 1e-15))
 
@@ -211,10 +210,8 @@ class Remainders:
         """Of eta in the order of the columns of H, where |e| <= W."""
         loop = self.loop
         parts = [] if loop.jumps or not loop.matched else [self._uncertainty(W)]
-        if loop.sways:
-            wind = loop.spec.disturbance
-            assert wind is not None
-            assert wind.rate is not None
+        wind = loop.spec.disturbance
+        if wind is not None and wind.rate is not None:
             each = loop.gusts.each
             parts.append((each, np.full(len(each), fraction_bounds(wind.rate)[1]), each))
         if loop.slow and loop.unknown:

@@ -193,9 +193,8 @@ class Loop:
             blocks.append((self.E, self.gusts))
         if self.jumps and self.matched:
             bounds = self.spec.uncertainty.bounds
-            assert bounds is not None
-            assert bounds.h is not None
-            blocks.append((self.B, Size.of(bounds.h, self.inputs)))
+            most = np.inf if bounds is None or bounds.h is None else fraction_bounds(bounds.h)[1]
+            blocks.append((self.B, Size(np.full(self.inputs, most), length=self.inputs > 1)))
         return tuple(blocks)
 
     # the plan in time

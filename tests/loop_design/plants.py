@@ -13,8 +13,8 @@ def plant(A, B, *, H=None, E=None, rho=None, **given):
     E = np.zeros((n, 0)) if E is None else np.array(E, float).reshape(n, -1)
     r, k = H.shape[1], E.shape[1]
     sizes = {"noise": n, "magnitude": r, "rate": r, "wind": k, "start": n, "eta_start": r}
-    sizes |= {"room": m, "wishes": n}
-    usual = {"room": np.inf, "wishes": np.inf}
+    sizes |= {"room": m, "wishes": n, "space": n}
+    usual = {"room": np.inf, "wishes": np.inf, "space": np.inf}
     arrays = {name: np.zeros(size) + given.pop(name, usual.get(name, 0.0)) for name, size in sizes.items()}
     rest = {"sample_time": 1.0, "delay": 0.0, "noise_ball": False, "wind_ball": False} | given
     return Plant(A=A, B=B, H=H, E=E, remainder=rho or (lambda W, U: np.zeros(n + m)), **arrays, **rest)
