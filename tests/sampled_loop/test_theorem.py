@@ -1,0 +1,438 @@
+"""The inequalities of the sampled loop against closed forms: one term at a time, never below, and at most 1 % above.
+
+Mostly x' = u at Ts = .1 under delta = -e/Ts, which forgets within a sample, so that a bound is what one sample does.
+`PIECE`: with what acts within a sample up to the end of a piece, of two.
+"""
+
+from dataclasses import replace
+from fractions import Fraction
+from math import exp, sqrt
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from tubecert.model import build
+from tubecert.sampled_loop.cells import largest_jump, steepness
+from tubecert.sampled_loop.record import Recipe
+from tubecert.sampled_loop.remainders import Remainders
+from tubecert.sampled_loop.responses import Dynamics, Kernel, Responses
+from tubecert.sampled_loop.setting import Controller, Loop
+from tubecert.sampled_loop.theorem import Boxes, Inequalities
+from tubecert.spec import Knots, load_text
+from tubecert.trajectory.make import plan_of
+from tubecert.trajectory.pieces import piecewise_plan
+
+TS, PIECE = 0.1, 1.5
+POINT = "{kind: equilibrium, at: [0], input: [0]}"
+WAVE = "{kind: expressions, x: ['sin(t)'], u: ['cos(t)'], horizon: 7, afterwards: repeat}"
+HOME = {
+    "system": "{states: [x], inputs: [u], f: ['0'], B: [[1]]}",
+    "safe_set": "{x: [-5000, 5000]}",
+    "trajectory": POINT,
+    "initial_state": "{at: [0]}",
+    "hardware": "{sample_time: 0.1}",
+}
+DOUBLE = {
+    "system": "{states: [x, v], inputs: [u], f: [v, '0'], B: [[0], [1]]}",
+    "safe_set": "{x: [-5, 5], v: [-5, 5]}",
+    "trajectory": "{kind: equilibrium, at: [0, 0], input: [0]}",
+    "initial_state": "{at: [0, 0]}",
+}
+OBSERVER = {"N": [[-2 / TS]], "F": [[1]], "G": [[-1 / TS]], "M": [[1]]}  # e_(k+1): what w has changed by
+NEAR = {"hold": "continuous"}
+
+
+def loop_of(*, slow=False, A=((0,),), B=((1,),), E=None, **sections) -> Loop:
+    text = "tubecert: 1\nname: a\n" + "\n".join(f"{k}: {v}" for k, v in {**HOME, **sections}.items())
+    spec = load_text(text)
+    model = build(spec)
+    plan = plan_of(spec, model)
+    E = E if E is not None else [[1.0]] if spec.disturbance else np.zeros((len(A), 0))
+    own = (np.array(each, dtype=float) for each in (A, B, E))
+    return Loop(
+        spec=spec, model=model, plan=plan, knots=None, slow=slow, **dict(zip("ABE", own, strict=True))
+    )
+
+
+def controller_of(N=((-1 / TS,),), F=(), G=(), M=()) -> Controller:
+    N = np.atleast_2d(np.array(N, dtype=float))
+    (m, n), z = N.shape, len(F)
+    shaped = zip((F, G, M), ((z, z), (z, n), (m, z)), strict=True)
+    return Controller(*(np.array(own, dtype=float).reshape(shape) for own, shape in shaped), N)
+
+
+def asked(
+    loop, tables=None, *, starts=(0,), lags=5, cut=None, pieces=2, panels=4, windows=64
+) -> Inequalities:
+    """`cut`: one lag for all; by default nothing is cut."""
+    tables = tables or controller_of()
+    outputs = loop.states + loop.inputs + tables.size
+    cuts = ((lags if cut is None else cut,) * loop.H.shape[1],) * outputs
+    recipe = Recipe(
+        lags=lags,
+        cuts=cuts,
+        pieces=pieces,
+        panels=panels,
+        windows=windows,
+        parameters="slow" if loop.slow else "sudden",
+    )
+    made = Responses(loop, tables, lags=lags, pieces=pieces, panels=panels)
+    return Inequalities(tables, recipe, starts, made, Remainders(loop, windows))
+
+
+def bounds(loop, W=1e-3, U=1e-3, Z=1e-3, tables=None, **recipe) -> Boxes:
+    """What follows for boxes that are the same in all states, inputs and memories, or one for each stage."""
+    own = asked(loop, tables, **recipe)
+    g, z = len(own.starts), own.controller.size
+    n, m = loop.states, loop.inputs
+    each = zip((W, U, Z), (n, m, z), strict=True)
+    return own.of(
+        Boxes(*(np.array(np.broadcast_to(np.reshape(x, (-1, 1)), (g, k)), dtype=float) for x, k in each))
+    )
+
+
+def close(found, exact, above=0.01):
+    """Not below, and not far above."""
+    found, exact = np.ravel(found), np.ravel(exact)
+    assert found.shape == exact.shape
+    assert (found >= exact * (1 - 1e-12) - 1e-30).all(), (found, exact)
+    assert (found <= exact * (1 + above) + 1e-12).all(), (found, exact)
+
+
+def test_noise():
+    found = bounds(loop_of(hardware="{sample_time: 0.1, noise: {x: 0.01}}"))
+    close(found.W, 0.01)
+    close(found.U, 0.02 / TS)
+
+
+@pytest.mark.parametrize(("noise", "both"), [("{x: 0.003, v: 0.004}", 0.007), ("0.005", sqrt(2) * 0.005)])
+def test_noise_by_components_and_by_length(noise, both):
+    """delta = n_x + n_v and nothing else: v moves by what one sample adds to the last L of them."""
+    loop = loop_of(
+        **DOUBLE, hardware=f"{{sample_time: 0.1, noise: {noise}}}", A=[[0, 1], [0, 0]], B=[[0], [1]]
+    )
+    own = asked(loop, controller_of([[1, 1]]))
+    blank = Boxes(*(np.zeros((1, k)) for k in (2, 1, 0)))
+    b = own._all(blank)[0]
+    close(b[0, -1], both, 1e-6)
+
+
+def test_wind():
+    found = bounds(loop_of(disturbance="{E: [[1]], bound: 0.3}"))
+    close(found.W, 0.3 * TS * PIECE)
+    close(found.U, 0.3)
+
+
+def test_wind_of_a_length_is_less_than_that_of_its_components():
+    E = "[['0.6', '0.8']]"
+    for bound, size in (("0.5", 0.5), ("[0.5, 0.5]", 0.7)):
+        close(bounds(loop_of(disturbance=f"{{E: {E}, bound: {bound}}}", E=[[0.6, 0.8]])).W, size * TS * PIECE)
+
+
+def test_wind_with_a_rate_counts_by_its_rate():
+    loop = loop_of(disturbance="{E: [[1]], bound: 9, rate: 0.4}")
+    found = bounds(loop, tables=controller_of(**OBSERVER), starts=(0, 6), lags=40)
+    close(found.W[1], 0.4 * TS**2 * (0.75 + 0.5))
+
+
+def test_wind_with_a_rate_is_cut():
+    """delta_k = m_(k-2) - 2 m_(k-1) of means of w: w itself two samples ago, and since then its rate."""
+    loop = loop_of(disturbance="{E: [[1]], bound: 0.5, rate: 0.4}")
+    for cut, size in ((0, 3 * 0.5), (2, 0.5 + 2.5 * 0.4 * TS), (1, 2 * 0.5 + 0.4 * TS + 0.5)):
+        close(bounds(loop, tables=controller_of(**OBSERVER), cut=cut, starts=(0, 3)).U[1], size)
+
+
+def test_h_begins_as_it_is_at_the_start():
+    for h, first in (("0.3*sin(2*t)", 0), ("0.3*cos(2*t)", 0.3)):
+        found = bounds(
+            loop_of(uncertainty=f"{{h: ['{h}']}}"), tables=controller_of(**OBSERVER), starts=(0, 2)
+        )
+        close(found.U[0], 2 * first + 0.6 * TS)
+
+
+def test_start():
+    for start, size in (
+        ("{at: [-0.02]}", 0.02),
+        ("{within: 0.02}", 0.02),
+        ("{box: {x: [-0.01, 0.02]}}", 0.02),
+    ):
+        found = bounds(loop_of(initial_state=start), W=0.03, starts=(0, 1))
+        close(found.W, [size, 1e-30], 1e-6)
+        close(found.U, [size / TS, 1e-30], 1e-6)
+
+
+def test_a_start_has_signs_a_box_has_none_and_a_ball_its_length():
+    """delta = 3 x + 4 v."""
+    for start, size in (("{at: [4, -3]}", 0), ("{box: {x: [-1, 1], v: [-1, 1]}}", 7), ("{within: 1}", 5)):
+        loop = loop_of(**{**DOUBLE, "initial_state": start}, A=[[0, 1], [0, 0]], B=[[0], [1]])
+        close(asked(loop, controller_of([[3, 4]]))._first(np.arange(2))[0, -1], size)
+
+
+def test_tail():
+    """e_(k+1) = e_k/2 + what wind adds: three lags, and an eighth of the box."""
+    loop = loop_of(disturbance="{E: [[1]], bound: 0.3}")
+    close(bounds(loop, W=0.8, tables=controller_of([[-5]]), lags=3).W, 1.75 * 0.03 + 0.1 + 0.015)
+
+
+def test_how_a_plan_s_input_is_held():
+    for hold, error in (("middle", TS / 2), ("left", TS), ("continuous", 2**-24)):
+        loop = loop_of(trajectory=WAVE, hardware=f"{{sample_time: 0.1, hold: {hold}}}")
+        close(Remainders(loop, 256).held, error)
+        if hold != "continuous":
+            close(bounds(loop, windows=256).W, error * TS * PIECE)
+
+
+def test_inputs_that_jump_across_the_end_of_a_plan_that_repeats():
+    """Up at .95, up again at 1.02: two jumps within half of a sample."""
+    rows = (0, 0, 0), ("0.02", 0, 1), ("0.3", "0.28", 0), ("0.67", "0.28", -1), ("0.95", 0, 0), (1, 0, 0)
+    t, x, u = zip(*(map(Fraction, row) for row in rows), strict=True)
+    knots = Knots(t=t, x=tuple((a,) for a in x), u=tuple((a,) for a in u), interpolation="hold")
+    loop = loop_of(trajectory=WAVE, hardware="{sample_time: 0.2}")
+    assert 2 <= largest_jump(replace(loop, plan=piecewise_plan(loop.model, knots)))[0] <= 3
+
+
+def rho(loop, W, U=0.0, size=()):
+    """What is left of x' = .. on the tube, through I and through B; the plan has 64 windows."""
+    own = Remainders(loop, 64)
+    W, U = np.full(loop.states, W, dtype=float), np.full(loop.inputs, U, dtype=float)
+    return own.rho(W, U, np.array(size, dtype=float))
+
+
+def scalar(f="0", B="1", more=""):
+    return f"{{states: [x], inputs: [u], f: ['{f}'], B: [['{B}']]{more}}}"
+
+
+AT_ONE = {"trajectory": "{kind: equilibrium, at: [1], input: [1]}", "initial_state": "{at: [1]}"}
+RANGE = ", parameters: {p: [0.9, 1.1]}"
+
+
+@pytest.mark.parametrize(
+    ("sections", "W", "U", "size", "through"),
+    [
+        ({"system": scalar("0.1*x**2")}, 0.5, 0, (), (0.125 * 0.25, 0)),  # .1 W^2, in four levels
+        ({"system": scalar("0", "1 + 0.1*x")}, 0.5, 2, (), (0.1 * 0.625 * (0.5 * 2 + 2 * 0.5), 0)),
+        ({"uncertainty": "{h: ['0.2*x']}"}, 0.5, 0, [0.1], (0, 0.1)),
+        ({"uncertainty": "{h: ['0.2*x']}", "system": scalar("0", "1 + 0.1*x")}, 0.5, 0, [3], (0.15, 0.1)),
+        ({"uncertainty": "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"}, 0.5, 0, [3], (0, 0.1)),
+        ({"uncertainty": "{bounds: {h: 3}}", "system": scalar("0", "1 + 0.1*x")}, 0.5, 0, (), (0.15, 0)),
+        ({"disturbance": "{E: [['1 + 0.2*x']], bound: 0.3}"}, 0.5, 0, (), (0.03, 0)),
+        ({"disturbance": "{E: [['1 + 0.2*x']], bound: 0.3, rate: 1}"}, 0.5, 0, [0.3], (0.03, 0)),
+        ({"disturbance": "{E: [['1 + 0.6*x', '1 + 0.8*x']], bound: 0.3}", "E": [[1, 1]]}, 0.5, 0, (), (0.15, 0)),
+        ({"trajectory": "{kind: equilibrium, at: [0], input: [0.02]}"}, 0.5, 0, (), (0.02, 2**-24 * 0.02)),
+        ({"trajectory": WAVE.replace("cos(t)'", "cos(t) + 0.02'")}, 0.5, 0, (), (0.02, TS / 2)),
+        ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": [[-1]]}, 0.5, 0, (), (0.1 + 0.05, 2**-24)),
+        ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": [[-1]], "slow": True}, 0.5, 0, [0.1], (0.05, 2**-24)),
+        ({**AT_ONE, "system": scalar("-x", "p", more=RANGE), "A": [[-1]], "slow": True}, 0.5, 4, [0.1], (0.4, 2**-24)),
+        (
+            {"trajectory": "{kind: any, x: {x: [-1, 1]}, u: {u: [-2, 2]}, defect: 0.03, input_rate: 4}",
+             "system": scalar("0.1*x**2"), "initial_state": "{within: 0.1}"},
+            0.5, 0, (), ((0.2 + 0.2 * 0.5 * 0.625) * 0.5 + 0.03, 0.2),
+        ),
+    ],
+)  # fmt: skip
+def test_what_is_left(sections, W, U, size, through):
+    close(rho(loop_of(**sections), W, U, size), through, 0.03)
+
+
+def test_what_is_left_acts_as_a_wind_does_through_its_columns():
+    """x' = v, v' = u: of a defect of v nothing but half of Ts^2 comes to x within a sample."""
+    loop = loop_of(**DOUBLE, A=[[0, 1], [0, 0]], B=[[0], [3]])
+    direct = Responses(loop, controller_of([[0, 0]]), lags=2, pieces=1, panels=64).direct[-1]
+    close(direct.rho, [[TS, TS**2 / 2, 3 * TS**2 / 2], [0, TS, 3 * TS]])
+
+
+def test_rounding_of_singles():
+    """x* = 1000: y, dy and what is sent, one unit of 2^-24 each, and the plan itself."""
+    at = {"trajectory": "{kind: equilibrium, at: [1000], input: [5]}", "initial_state": "{at: [1000]}"}
+    loop = loop_of(**at, system=scalar(), hardware="{sample_time: 0.1, arithmetic: single}")
+    off = asked(loop)._rounding(Boxes(np.full((1, 1), 2.0), np.zeros((1, 1)), np.zeros((1, 0))))
+    unit = 2**-24
+    close(off, [unit * 1000 + 2 * unit * 2002, 4 * unit * (5 + 5 * unit + 10 * 2)], 1e-3)
+    own = asked(loop, controller_of([[-10]], [[0.5]], [[3]], [[7]]))
+    off = own._rounding(Boxes(np.full((1, 1), 2.0), np.zeros((1, 1)), np.full((1, 1), 9.0)))
+    close(off[1:], [5 * unit * (5 + 7 * 9 + 10 * 2), 5 * unit * (0.5 * 9 + 3 * 2)], 1e-3)
+    found = bounds(loop, W=2.0, tables=controller_of([[-10]]))
+    defect = 5  # x' = u, at rest under 5
+    y, u = unit * 1000 + 2 * unit * 2002, 4 * unit * 25
+    close(found.W, (y + TS * u) + (defect + 5 * unit) * TS * PIECE)
+    close(found.U, [defect + (2 * y + TS * u) / TS + u])
+
+
+@pytest.mark.parametrize("whole", [0, 1, 2])
+@pytest.mark.parametrize("rest", ["0", "0.03"])
+def test_a_sample_is_that_of_the_plant(whole, rest):
+    """xi and e by the loop in 20 parts of a sample, with every signal that enters at a sample."""
+    rng = np.random.default_rng(whole)
+    A, B, E = rng.normal(size=(2, 2)), rng.normal(size=(2, 1)), rng.normal(size=(2, 1))
+    machine = f"{{sample_time: 0.1, delay: {whole / 10 + float(rest):g}}}"
+    wind = {"disturbance": "{E: [['1'], ['1']], bound: 1, rate: 1}"}
+    loop = loop_of(**{**DOUBLE, "hardware": machine}, **wind, A=A, B=B, E=E)
+    c = controller_of(
+        rng.normal(size=(1, 2)), rng.normal(size=(3, 3)), rng.normal(size=(3, 2)), rng.normal(size=(1, 3))
+    )
+    own = Dynamics(loop, c)
+    (core, eta), enters, nodes = own.step(), own.discrete(), 10
+    e, zeta, past, w, n = (
+        rng.normal(size=2),
+        rng.normal(size=3),
+        list(rng.normal(size=whole + 1)),
+        rng.normal(),
+        rng.normal(size=2),
+    )
+    du, dz = rng.normal(size=1), rng.normal(size=3)
+    xi = np.concatenate([e, zeta, past])
+    delta = c.M @ zeta + c.N @ (e + n) + du
+    queue = [*delta, *past]
+    h = TS / nodes
+    full = expm(np.block([[A, np.hstack([B, E])], [np.zeros((2, 4))]]) * h)
+    for k in range(nodes):
+        acting = queue[whole] if k * h >= float(rest) - 1e-9 else queue[whole + 1]
+        flow, slope = (
+            own.flow(loop.sample_time * k / nodes),
+            own.slope(loop.sample_time * (2 * k + 1) / (2 * nodes)),
+        )
+        at = flow.core.mid @ xi + flow.eta.mid[:, 0] * w + flow.noise.mid @ n + flow.rounding.mid @ du
+        assert np.allclose(at, e, rtol=1e-9)
+        middle = expm(np.block([[A, np.hstack([B, E])], [np.zeros((2, 4))]]) * h / 2) @ np.array(
+            [*e, acting, w]
+        )
+        moved = slope.core.mid @ xi + slope.eta.mid[:, 0] * w + slope.noise.mid @ n + slope.rounding.mid @ du
+        assert np.allclose(moved, A @ middle[:2] + B[:, 0] * acting + E[:, 0] * w, rtol=1e-9)
+        e = (full @ np.array([*e, acting, w]))[:2]
+    after = np.concatenate([e, c.F @ zeta + c.G @ (xi[:2] + n) + dz, queue[: whole + 1]])
+    found = core.mid @ xi + eta.mid[:, 0] * w + enters.mid @ np.concatenate([n, du, dz])
+    assert np.allclose(found, after, rtol=1e-9)
+    assert max(own.rad.max() for own in (core, eta, enters)) < 1e-12
+
+
+@pytest.mark.parametrize("length", [False, True])
+def test_integrals_of_kernels(length):
+    rng = np.random.default_rng(3)
+    A, K, rows, plus = (
+        rng.normal(size=(2, 2)) * 3,
+        rng.normal(size=(2, 3)),
+        rng.normal(size=(4, 2)),
+        rng.normal(size=(4, 3)),
+    )
+    loop = loop_of(**DOUBLE, A=A, B=[[0], [1]])
+    ends = [loop.sample_time * k / 16 for k in range(17)]
+    own = Responses(loop, controller_of([[0, 0]]), lags=1, pieces=1, panels=1).dynamics.exponential
+    s = (np.arange(200) + 0.5) / 200 * TS
+    phi = np.array([expm(A * t) for t in s])
+    whole = np.array([expm(np.block([[A, np.eye(2)], [np.zeros((2, 4))]]) * t)[:2, 2:] for t in s])
+    for integral, each, more in ((False, phi, None), (True, whole, plus)):
+        value = rows @ each @ K + (0 if more is None else more)
+        size = np.linalg.norm(value, axis=-1, keepdims=True) if length else np.abs(value)
+        close(
+            Kernel(own, A, K, ends, integral=integral).of(rows, more, length=length),
+            size.mean(axis=0) * TS * (1 - 1e-3),
+            0.02,
+        )
+    coarse = Kernel(own, A, K, [ends[0], ends[-1]], integral=False)  # one chord, and how far it may be off
+    assert (
+        coarse.of(rows, length=length) >= size_of(rows @ phi @ K, length).mean(axis=0) * TS * (1 - 1e-3)
+    ).all()
+
+
+def size_of(value, length):
+    return np.linalg.norm(value, axis=-1, keepdims=True) if length else np.abs(value)
+
+
+def test_exponentials_of_any_length():
+    A = np.array([[0.0, 40.0], [-30.0, -2.0]])
+    own = Dynamics(loop_of(**DOUBLE, A=A, B=[[0], [1]]), controller_of([[0, 0]])).exponential
+    for t in (Fraction(1, 1000), Fraction(1, 10), Fraction(3, 10)):
+        phi, whole = own.at(t)
+        exact = expm(np.block([[A, np.eye(2)], [np.zeros((2, 4))]]) * float(t))
+        for found, part in ((phi, exact[:2, :2]), (whole, exact[:2, 2:])):
+            assert (np.abs(found.mid - part) <= found.rad + 1e-12).all()
+            assert (found.rad <= 1e-10).all()
+
+
+def test_how_far_from_the_chord():
+    """x' = v, v' = u, whose input is held: x is a parabola, Ts^2/8 |delta| off; as all of xi and n may have it."""
+    loop = loop_of(**DOUBLE, A=[[0, 1], [0, 0]], B=[[0], [1]], uncertainty="{h: ['0.1*sin(t)']}")
+    piece = Responses(loop, controller_of([[-3, -4]]), lags=1, pieces=1, panels=1).pieces[0]
+    arc = TS**2 / 8
+    close(piece.core, [[3 * arc, 4 * arc, 0], [0, 0, 0]])
+    close(piece.noise, [[3 * arc, 4 * arc], [0, 0]])
+    close(piece.eta, [[arc], [0]])
+    close(piece.rounding, [[arc], [0]])
+    late = loop_of(
+        **{**DOUBLE, "hardware": "{sample_time: 0.1, delay: 0.04}"}, A=[[0, 1], [0, 0]], B=[[0], [1]]
+    )
+    first, last = Responses(late, controller_of([[-3, -4]]), lags=1, pieces=1, panels=1).pieces
+    close(first.core, [[0, 0, 0.04**2 / 8], [0, 0, 0]])
+    close(last.core, [[3 * 0.06**2 / 8, 4 * 0.06**2 / 8, 0], [0, 0, 0]])
+
+
+def test_chords_meet_the_box_and_noise():
+    machine = "{sample_time: 0.1, noise: {x: 0.01, v: 0.02}}"
+    loop = loop_of(**{**DOUBLE, "hardware": machine}, A=[[0, 1], [0, 0]], B=[[0], [1]])
+    own = asked(loop, controller_of([[-3, -4]]), pieces=1)
+    boxes = Boxes(np.array([[0.5, 0.7]]), np.array([[9.0]]), np.zeros((1, 0)))
+    (phase,), _ = own.phases(boxes)
+    close(own._between(phase, np.zeros(3)), [[(3 * 0.51 + 4 * 0.72) * TS**2 / 8, 1e-30]])
+
+
+def test_what_was_sent_in_a_stage_is_met_in_the_next():
+    """x' = -x + u, Ts = tau = 1, delta = -e, e(0) = -1: .368 at 1, and -.497 at 2."""
+    loop = loop_of(
+        A=[[-1]], system=scalar("-x"), initial_state="{at: [-1]}", hardware="{sample_time: 1, delay: 1}"
+    )
+    for lags in (1, 6):
+        found = bounds(
+            loop,
+            [1.01, 0.4, 0.6],
+            [1.01, 0.4, 0.6],
+            tables=controller_of([[-1]]),
+            lags=lags,
+            starts=(0, 1, 2),
+        )
+        assert found.W[2, 0] >= 1 - exp(-1) - exp(-2)
+    W = np.array([[1.0], [0.4], [0.6]])
+    phases, _ = asked(loop, controller_of([[-1]]), starts=(0, 4, 20)).phases(Boxes(W, W, np.zeros((3, 0))))
+    assert [(own.start, own.core[0], own.core[1]) for own in phases] == [
+        (0, 1, 1), (4, 0.4, 1), (6, 0.4, 0.4), (20, 0.6, 0.6), (22, 0.6, 0.6)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("sections", "size", "rate", "first"),
+    [
+        ({"uncertainty": "{h: ['0.3*sin(2*t) + 0.2*x']}", "trajectory": WAVE}, 0.3 + 0.2 * 1.5, 0.8, 0),
+        ({"uncertainty": "{h: ['0.3*cos(2*t)']}", "trajectory": WAVE}, 0.3, 0.6, 0.3),
+        ({"uncertainty": "{bounds: {h: 3, h_x: 0.2, h_t: 1}}", "trajectory": WAVE}, 3, 1.2, 3),
+        ({"disturbance": "{E: [[1]], bound: 0.3, rate: 2}"}, 0.3, 2, 0.3),
+        ({"trajectory": WAVE, "system": scalar("(p - 1)*x", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
+        ({"trajectory": WAVE, "system": scalar("0", "p", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
+    ],
+)  # fmt: skip
+def test_sizes_and_rates(sections, size, rate, first):
+    found = Remainders(loop_of(**sections), 512).sizes(np.array([0.5]))
+    for own, exact in ((found.size, size), (found.rate, rate), (found.first, first)):
+        close(own, exact, 0.03)
+
+
+def test_a_plan_that_rests_is_at_rest_only_as_far_as_it_is():
+    trajectory = "{kind: expressions, x: ['0.1*t'], u: ['0.1'], horizon: 2, afterwards: rest}"
+    loop = loop_of(trajectory=trajectory)
+    assert loop.samples is None
+    close(Remainders(loop, 8).defect, 0.1)
+
+
+@pytest.mark.parametrize(("rate", "steep"), [("", None), (", input_rate: 4", 4)])
+def test_inputs_of_a_family_are_held_by_the_planner_or_have_a_rate(rate, steep):
+    trajectory = f"{{kind: any, x: {{x: [-1, 1]}}, u: {{u: [-1, 1]}}, defect: 0.1{rate}}}"
+    loop = loop_of(trajectory=trajectory, initial_state="{within: 0.1}")
+    found = steepness(loop, 3)
+    assert found is None if steep is None else found == [steep]
+    close(Remainders(loop, 4).held, (steep or 0) * TS / 2 + 2**-24)
+
+
+def test_rows_up_to_the_last_that_differs():
+    late = loop_of(hardware="{sample_time: 0.1, delay: 0.25}")
+    assert asked(late, starts=(0, 9), lags=7).last == 9 + 2 + 1 + 7
+    ends = loop_of(trajectory=WAVE.replace("repeat", "nothing").replace("horizon: 7", "horizon: 1.01"))
+    assert (ends.samples, asked(ends, lags=50).last) == (11, 10)
