@@ -8,10 +8,9 @@ import pytest
 from loops import proven, setting
 from scipy.optimize import linprog
 
-from tubecert.sampled_loop.record import HexMatrix
 from tubecert.simulation import campaign
 from tubecert.simulation.attack import Attack, worst_of
-from tubecert.simulation.campaign import simulate, summary
+from tubecert.simulation.campaign import simulate
 from tubecert.simulation.kernels import goals
 
 
@@ -38,7 +37,7 @@ def test_a_slow_signal_does_its_worst_as_a_linear_program_says(rate):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["scalar", "cart"])
 def test_a_loop_without_remainders_is_driven_to_its_edge_and_not_beyond(name):
-    found = summary(simulate(setting(name), "hash", runs=30, seed=0))
+    found = simulate(setting(name), "hash", runs=30, seed=0).summary
     assert found.outcome == "not falsified"
     assert found.error < 1e-6
     for own in (*found.states.values(), *found.inputs.values()):
@@ -66,7 +65,7 @@ def sabotaged(how):
         return setting("cart", ("0.2*sin", "0.3*sin"))
     own = setting("cart")
     if how == "sign":
-        return replace(own, tables=replace(own.tables, N=HexMatrix(own.tables.N.value * [[1, -1]])))
+        return replace(own, tables=replace(own.tables, N=own.tables.N * [[1, -1]]))
     return replace(own, bounds=0.9 * own.bounds)
 
 
@@ -74,13 +73,13 @@ def sabotaged(how):
 @pytest.mark.parametrize("how", ["h", "sign", "width"])
 def test_a_lie_is_found_with_seed_run_and_time(how):
     own = sabotaged(how)
-    found = summary(simulate(own, "hash", runs=20, seed=4))
+    found = simulate(own, "hash", runs=20, seed=4).summary
     assert (found.outcome, found.seed) == ("falsified", 4)
     first = found.violations[0]
     attack = Attack(setting=own, seed=4)
-    again = campaign._chunk(attack, attack.lanes(first.run, first.run + 1), campaign.controllers_of(own))
-    assert again.peaks.left[0] == first.t
-    assert own.names[again.peaks.what[0]] == first.of
+    again = campaign.chunk(attack, attack.lanes(first.run, first.run + 1))
+    assert again.left[0] == first.t
+    assert own.names[again.what[0]] == first.of
 
 
 @pytest.mark.slow
@@ -97,7 +96,7 @@ def test_what_is_finished_stays_and_the_same_seed_says_the_same(monkeypatch):
     whole, some = simulate(own, "h", runs=60, seed=1), simulate(own, "h", runs=60, seed=1, report=stop)
     assert (some.outcome, some.runs, told) == ("interrupted", 64, [0, 32, 64])
     np.testing.assert_array_equal(whole.all("share")[:, :64], some.all("share"))
-    assert summary(whole).to_json()["states"]["x"]["random_by_stage"]
+    assert whole.summary.to_json()["states"]["x"]["random_by_stage"]
     assert (simulate(own, "h", runs=60, seed=2).all("share")[:, 60:] != whole.all("share")[:, 60:]).any()
 
 
@@ -108,7 +107,7 @@ def test_inputs_and_obstacles_are_judged_as_well():
     narrow = replace(own.result, inputs=(replace(use, range=(Fraction(-1, 10), use.range[1])),))
     near = replace(own, result=narrow)
     assert simulate(near, "h", runs=0, seed=0).outcome == "falsified"
-    assert summary(simulate(own, "h", runs=0, seed=0)).obstacles[0].distance > 1
+    assert simulate(own, "h", runs=0, seed=0).summary.obstacles[0].distance > 1
     touched = setting("cart", ("center: [2, 0]", "center: [0.5, 0]"))
     assert proven("cart").clearance[0].verdict.value == "certified"
     assert simulate(touched, "h", runs=0, seed=0).outcome == "falsified"

@@ -67,7 +67,7 @@ class Belonging:
 
 def compared(spec: Spec, result: Result) -> Belonging:
     """The `result` of a certificate against a specification; raises `SpecError` for keys set that it lacks."""
-    own, effective = canonical(as_set(spec, result.overrides)), result.spec.effective.data
+    own, effective = canonical(as_set(spec, result.overrides.settings)), result.spec.effective.data
     _taken_over(own, effective, result.overrides)
     asked = own["metric"].get("synthesise") if "metric" in own else None
     if asked is not None and result.synthesis is not None and result.synthesis.asked.data == asked:
@@ -88,7 +88,7 @@ def compared_canonically(
     spec: Spec, effective: Mapping[str, Any], settings: Mapping[str, str], file_hash: str, knots: Rows | None
 ) -> Belonging:
     """The same of a certificate that rests on the specification, the keys that were set, and knots t, x, u alone."""
-    own = again(spec, _settings(settings))
+    own = as_set(spec, settings)
     differing, table = _differing(canonical(own), effective), own.trajectory.table
     if table is not None and (table.knots.t, table.knots.x, table.knots.u) != knots:
         differing.append(f"the knots of {table.file}")
@@ -100,10 +100,6 @@ def compared_canonically(
         synthesised=False,
         rewritten=("the file",) if rewritten else (),
     )
-
-
-def _settings(texts: Mapping[str, str]) -> list[Setting]:
-    return [Setting(path=path, text=text) for path, text in sorted(texts.items())]
 
 
 def _told(overrides: Overrides) -> Iterator[str]:
@@ -126,9 +122,9 @@ def _hash(digest: str) -> str:
     return f"sha256:{digest}"
 
 
-def as_set(spec: Spec, overrides: Overrides) -> Spec:
+def as_set(spec: Spec, settings: Mapping[str, str]) -> Spec:
     """The specification with the keys that were set on the command line that certified."""
-    return again(spec, _settings(overrides.settings))
+    return again(spec, [Setting(path=path, text=text) for path, text in sorted(settings.items())])
 
 
 def _taken_over(own: dict[str, Any], effective: Mapping[str, Any], overrides: Overrides) -> None:

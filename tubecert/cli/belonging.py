@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tubecert.certificate.belonging import ForeignError, compared, compared_canonically
+from tubecert.certificate.belonging import ForeignError, compared
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
 from tubecert.recheck.certificate import read_certificate
@@ -31,10 +31,9 @@ def belongs(document: Node, name: str, path: str) -> str:
 def sampled_belongs(text: str, name: str, path: str) -> str:
     """The same of the file of a certificate of a sampled loop."""
     from tubecert import spec
+    from tubecert.library.sampled import compared as sampled_compared
 
-    loaded, result = spec.load(path), read(text, name).result
-    own, plan = result.spec, result.planned
-    knots = None if plan is None else (plan.t, plan.x, plan.u)
-    found = compared_canonically(loaded, own.effective.data, own.settings, own.file_hash, knots)
+    loaded = spec.load(path)
+    found = sampled_compared(loaded, read(text, name).result)
     found.require(loaded, name)
     return found.words(path)

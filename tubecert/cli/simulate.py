@@ -105,11 +105,9 @@ def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Out
     from tubecert.library.simulating import sampled_of
     from tubecert.report import sampled_simulation
     from tubecert.simulate.output import prepared
-    from tubecert.simulation.files import write
 
-    words = {"metric": given.metric, "scheduler": given.scheduler, "controllers": given.controllers}
-    asked = {**given.numbers, **words, "gains": given.gains, "plan": given.plan}
-    require_nothing_of_a_metric(asked, flag)
+    words = {name: getattr(given, name) for name in ("metric", "scheduler", "controllers", "gains", "plan")}
+    require_nothing_of_a_metric({**given.numbers, **words}, flag)
     folder = _folder(given)
     with prepared(folder), telling.shown(Terminal.stderr(color=output.color), output) as report:
         found = None if given.certificate is None else read(given.certificate)
@@ -118,14 +116,12 @@ def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Out
             found = certified(system, progress=report, command="tubecert simulate")
             found.save(Path(folder) / "certificate.json")
         if not isinstance(found, SampledCertification):
-            raise foreign(
-                str(given.certificate), "is of a loop that rests on a metric, and not of a sampled one"
-            )
-        campaign = sampled_of(found, system, numbers, given=asked, report=report, named=flag)
-        if not campaign.runs:
+            what = "is of a loop that rests on a metric, and not of a sampled one"
+            raise foreign(str(given.certificate), what)
+        simulation = sampled_of(found, system, numbers, report)
+        if not simulation.runs:
             return ExitCode.INTERRUPTED
-        files = write(folder, campaign.campaign)
-    data = campaign.found
+        data, files = simulation.found, simulation.save(folder)
     present(
         output,
         sampled_simulation.verdict_line(data),

@@ -24,6 +24,7 @@ from tubecert.spec import Spec
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from tubecert.certificate.belonging import Belonging
     from tubecert.controller.data import Data
     from tubecert.report.page import Reason
 
@@ -197,6 +198,15 @@ def certified(spec: Spec, *, progress: Progress | None, command: str) -> Sampled
 def certification_of(certificate: Certificate, given: Specification | None = None) -> SampledCertification:
     """A sealed certificate as a value."""
     return SampledCertification(certificate=certificate, text=certificate_text(certificate), given=given)
+
+
+def compared(spec: Spec, result: Result) -> Belonging:
+    """A certificate's result against a specification."""
+    from tubecert.certificate.belonging import compared_canonically
+
+    own, plan = result.spec, result.planned
+    knots = None if plan is None else (plan.t, plan.x, plan.u)
+    return compared_canonically(spec, own.effective.data, own.settings, own.file_hash, knots)
 
 
 def _rounded_up(values: Mapping[str, Fraction]) -> Mapping[str, float]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tubecert.digits import short
-from tubecert.errors import SpecError, TubecertError
+from tubecert.errors import TubecertError
 from tubecert.findings import Finding
+from tubecert.library.sampled import SampledCertification, compared
 from tubecert.library.specification import File
 from tubecert.progress import Progress
 from tubecert.records import Json
@@ -20,8 +20,9 @@ from tubecert.spec import Spec
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tubecert.simulation.campaign import Campaign, Controllers
+    from tubecert.simulation.campaign import Campaign
     from tubecert.simulation.record import Summary
+    from tubecert.simulation.sampled import Controllers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,9 +52,7 @@ class SampledSimulation:
     @property
     def found(self) -> Summary:
         """Everything that was found, as a record; there is none before the first runs are finished."""
-        from tubecert.simulation.campaign import summary
-
-        return summary(self.campaign)
+        return self.campaign.summary
 
     @property
     def summary(self) -> Json:
@@ -74,11 +73,11 @@ class SampledSimulation:
 
     def save(self, folder: File) -> list[str]:
         """Write summary, runs and figures into a folder, as the command does; their names. Raises `TargetError`."""
-        from tubecert.simulate.output import prepared
-        from tubecert.simulation.files import write
+        from tubecert.simulate.output import prepared, written_to
+        from tubecert.simulation.figures import files
 
         with prepared(os.fspath(folder)):
-            return write(os.fspath(folder), self.campaign)
+            return written_to(os.fspath(folder), files(self.campaign))
 
     def __str__(self) -> str:
         from tubecert.report.sampled_simulation import verdict_line
@@ -91,17 +90,14 @@ class SampledSimulation:
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        shares = [
-            (name, f"largest share {short(peak.share)}")
-            for name, own in (*self.found.states.items(), *self.found.inputs.items())
-            for peak in [max(filter(None, (own.random, own.adversary)), key=lambda peak: peak.share)]
-        ]
-        style = "falsified" if self.falsified else ""
-        return notebook.of_line(str(self), self.campaign.setting.spec.name, style, shares)
+        shares = self.campaign.all("share").max(axis=1)
+        names = self.campaign.setting.names
+        rows = [(name, f"largest share {short(share)}") for name, share in zip(names, shares, strict=True)]
+        return notebook.of_line(str(self), self.found.name, "falsified" if self.falsified else "", rows)
 
 
 def simulated(
-    certificate: Certificate,
+    found: SampledCertification,
     spec: Spec,
     *,
     runs: int,
@@ -110,58 +106,29 @@ def simulated(
     report: Progress | None,
 ) -> SampledSimulation:
     """The campaign of a certificate; raises `TubecertError` if there is no tube, or it is of another specification."""
+    from tubecert.certificate.belonging import as_set
     from tubecert.simulation.campaign import simulate
     from tubecert.simulation.setting import setting_of
 
-    require_figures()
-    _require_tube(certificate)
-    setting = setting_of(_adopted(spec, certificate), certificate.result, duration)
-    made = _compiled(certificate)
+    _require_tube(found)
+    compared(spec, found.result).require(spec, "the certificate")
+    setting = setting_of(as_set(spec, found.result.spec.settings), found.result, duration)
+    made = _compiled(found.certificate)
     return SampledSimulation(
-        campaign=simulate(setting, certificate.hash, made, runs=runs, seed=seed, report=report)
+        campaign=simulate(setting, found.hash, made, runs=runs, seed=seed, report=report)
     )
 
 
-def require_figures() -> None:
-    """Raises `SpecError` without the library that draws."""
-    if importlib.util.find_spec("matplotlib") is None:
-        help = "install tubecert with its extra: pip install 'tubecert[simulate]'"
-        raise SpecError([Finding(code="TC122", message="simulate needs matplotlib", help=help)])
-
-
-def _require_tube(certificate: Certificate) -> None:
+def _require_tube(found: SampledCertification) -> None:
     """Raises TC703 where nothing is proven."""
-    result = certificate.result
+    result = found.result
     if result.tube and result.controller is not None and result.nominal is not None:
         return
-    from tubecert.words.sampled_loop import why
-
-    reason = why(result.lacks[0], result.spec.effective.system.units) if result.lacks else "nothing was found"
-    message = f"there is no tube that a simulation could leave ({result.verdict}: {reason})"
+    reason = found.reasons[0].message if found.reasons else "nothing was found"
+    message = f"there is no tube that a simulation could leave ({found.verdict}: {reason})"
     error = TubecertError([Finding(code="TC703", message=message, help="tubecert certify tells more")])
-    error.exit_code = result.verdict.exit_code
+    error.exit_code = found.verdict.exit_code
     raise error
-
-
-def _adopted(spec: Spec, certificate: Certificate) -> Spec:
-    """The specification with what the command line that certified had set; raises TC604 if it is another one."""
-    from tubecert.certificate.belonging import ForeignError
-    from tubecert.spec import Setting, canonical
-    from tubecert.spec.load import again
-
-    source = certificate.result.spec
-    spec = again(spec, [Setting(path=path, text=text) for path, text in sorted(source.settings.items())])
-    own, other = canonical(spec), source.effective.data
-    differing = sorted(
-        key for key in {*own, *other} - {"simulation", "expect"} if own.get(key) != other.get(key)
-    )
-    if not differing:
-        return spec
-    message = f"the certificate does not belong to this specification: {', '.join(differing)} differ"
-    help = "certify again, or give the specification that was certified"
-    raise ForeignError(
-        [Finding(code="TC604", message=message, location=spec.location(differing[0]), help=help)]
-    )
 
 
 def _compiled(certificate: Certificate) -> Controllers | None:

@@ -83,7 +83,8 @@ def simulate(
     system = specification_of(found) if spec is None else spec_of(spec)
     if isinstance(found, SampledCertification):
         given = {"controllers": controllers, "gains": gains, "plan": plan, **texts}
-        return sampled_of(found, system, numbers, given=given, report=timed(progress), named=str)
+        require_nothing_of_a_metric(given, str)
+        return sampled_of(found, system, numbers, timed(progress))
     require_extra()
     chosen = controllers_of(controllers, str)
     one_of("gains", gains, words_of(ADAPTIVE))
@@ -98,19 +99,13 @@ def simulate(
 
 
 def sampled_of(
-    found: SampledCertification,
-    system: Spec,
-    numbers: SimulationNumbers,
-    *,
-    given: Mapping[str, object],
-    report: Progress | None,
-    named: Named,
+    found: SampledCertification, system: Spec, numbers: SimulationNumbers, report: Progress | None
 ) -> SampledSimulation:
-    """The same of a sampled loop; raises `SpecError` for what is `given` and means nothing there."""
-    require_nothing_of_a_metric(given, named)
+    """The same of a sampled loop."""
+    require_extra(("matplotlib",))
     default = system.simulation or Section()
     return simulated(
-        found.certificate,
+        found,
         system,
         runs=_first(numbers.runs, default.runs, RUNS),
         seed=_first(numbers.seed, default.seed, SEED),
@@ -146,9 +141,9 @@ class Wishes:
     plan: str | None
 
 
-def require_extra() -> None:
+def require_extra(names: Sequence[str] = EXTRA) -> None:
     """Raises `SpecError` without the libraries that nothing else needs."""
-    missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
+    missing = [name for name in names if importlib.util.find_spec(name) is None]
     if missing:
         message = f"simulate needs {' and '.join(missing)}"
         help = "install tubecert with its extra: pip install 'tubecert[simulate]'"

@@ -11,21 +11,22 @@ from rich.text import Text
 
 from tubecert.digits import UNKNOWN, down, short, up
 from tubecert.report.layout import indented, titled
-from tubecert.simulate.inputs import InputUse
-from tubecert.simulate.told import (
-    ClearanceData,
-    ComparisonData,
-    GainsData,
-    LoopData,
-    MembersData,
-    RunAt,
-    StoppedData,
-    Summary,
-    ViolationData,
-)
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from tubecert.simulate.inputs import InputUse
+    from tubecert.simulate.told import (
+        ClearanceData,
+        ComparisonData,
+        GainsData,
+        LoopData,
+        MembersData,
+        RunAt,
+        StoppedData,
+        Summary,
+        ViolationData,
+    )
 
 STYLES: Final = {
     "falsified": "bold red",

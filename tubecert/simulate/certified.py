@@ -101,7 +101,7 @@ def adopted(spec: Spec, result: Result) -> Spec:
     """
     compared(spec, result).require(spec, "the certificate")
     other = load_text(result.spec.effective.at_rest(_UNUSED), "certificate")
-    spec = as_set(spec, result.overrides)
+    spec = as_set(spec, result.overrides.settings)
     spec = replace(spec, tube=other.tube)
     if result.overrides.metric is None and spec.metric is not None:
         return spec

@@ -8,21 +8,29 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from io import BytesIO
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.campaign import Campaign
 from tubecert.simulate.figures_plane import plane
-from tubecert.simulate.figures_style import COLORS, NAMES, STYLE, TUBE, blank, finish, labelled, line
+from tubecert.simulate.figures_style import (
+    COLORS,
+    FORMATS,
+    NAMES,
+    STYLE,
+    TUBE,
+    blank,
+    finish,
+    images,
+    labelled,
+    line,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FORMATS: Final = ("png", "svg")
 
 
 def figures(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
@@ -34,7 +42,7 @@ def figures(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
         with mpl.rc_context(STYLE):
             figure = drawn(name, campaign)
             if figure is not None:
-                yield from _files(name, figure)
+                yield from images(name, figure)
 
 
 def figure_names() -> list[str]:
@@ -60,14 +68,6 @@ def _drawers() -> dict[str, Callable[[Campaign], Figure | None]]:
     }
 
 
-def _files(name: str, figure: Figure) -> Iterator[tuple[str, bytes]]:
-    for kind in FORMATS:
-        buffer = BytesIO()
-        metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
-        figure.savefig(buffer, format=kind, metadata=metadata)
-        yield f"{name}.{kind}", buffer.getvalue()
-
-
 def _states(campaign: Campaign) -> Figure:
     """Every state over time, in the tube's half-widths, with the radius that is certified in the long run."""
     setting, first = campaign.setting, campaign.drawn[0].runs
@@ -89,7 +89,7 @@ def _states(campaign: Campaign) -> Figure:
             axis.plot(item.runs.t, item.runs.x[0, :, i], **line(item))
         axis.plot(first.t, plan, color="black", lw=1.0, ls="--", label="plan")
         _limit(axis, plan, width, [item.runs.x[0, :, i] for item in campaign.drawn])
-        axis.set_ylabel(labelled(setting, name))
+        axis.set_ylabel(labelled(setting.spec, name))
     finish(figure, axes[-1], axes[0], campaign)
     return figure
 
@@ -136,7 +136,7 @@ def _inputs(campaign: Campaign) -> Figure:
             if item.loop.problem.adaptive or item.loop.tested:
                 axis.plot(runs.t, runs.u_a[0, :, row], color=COLORS["l1"], lw=1.0, label="adaptive u_a")
             if column == 0:
-                axis.set_ylabel(labelled(setting, name))
+                axis.set_ylabel(labelled(setting.spec, name))
         axes[0, column].set_title(NAMES[item.loop.controller], fontsize=9, loc="left")
         axes[-1, column].set_xlabel("t [s]")
         axes[-1, column].set_xlim(0, setting.horizon)

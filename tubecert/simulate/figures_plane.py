@@ -8,23 +8,26 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
-from tubecert.simulate.campaign import Campaign
 from tubecert.simulate.clearance import corners_of
 from tubecert.simulate.figures_style import blank, labelled, line, title
-from tubecert.simulate.setting import Setting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from tubecert.simulate.campaign import Campaign
+    from tubecert.simulate.setting import Setting
+    from tubecert.spec import Spec
+
 _SHAPES: Final = 400  # cross-sections of the tube that are drawn
-_TUBE: Final = "#FBE3B5"  # opaque: overlapping shapes must not darken each other
+LIGHT: Final = "#FBE3B5"
+"""Of a tube, opaque: overlapping shapes must not darken each other."""
 
 
 def plane(campaign: Campaign) -> Figure | None:
     """The plane with plan, tube, obstacles and loops."""
     setting = campaign.setting
-    names = _names(setting)
+    names = names_of(setting.spec)
     if names is None:
         return None
     from matplotlib.collections import PolyCollection
@@ -35,8 +38,8 @@ def plane(campaign: Campaign) -> Figure | None:
     plan = _fine_plan(setting)
     section = _section(setting, i, j)
     shapes = [section + point for point in _spread(plan[:, [i, j]])]
-    axis.add_collection(PolyCollection(shapes, facecolors=_TUBE, edgecolors="none", zorder=1))
-    _obstacles(axis, setting, names)
+    axis.add_collection(PolyCollection(shapes, facecolors=LIGHT, edgecolors="none", zorder=1))
+    obstacles(axis, setting.spec, names)
     for item in campaign.drawn:
         axis.plot(item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4, **line(item))
     axis.plot(plan[:, i], plan[:, j], color="black", lw=1.0, ls="--", zorder=5, label="plan")
@@ -44,20 +47,19 @@ def plane(campaign: Campaign) -> Figure | None:
     axis.plot(*plan[-1, [i, j]], marker="s", ms=4, color="black", ls="none", zorder=6)
     _window(axis, np.vstack(shapes), [item.runs.x[0][:, [i, j]] for item in campaign.drawn])
     axis.set_aspect("equal")
-    axis.set_xlabel(labelled(setting, names[0]))
-    axis.set_ylabel(labelled(setting, names[1]))
+    axis.set_xlabel(labelled(setting.spec, names[0]))
+    axis.set_ylabel(labelled(setting.spec, names[1]))
     axis.set_title(title(campaign), fontsize=9, loc="left")
     handles, labels = axis.get_legend_handles_labels()
     from matplotlib.patches import Patch
 
-    tube = Patch(facecolor=_TUBE)
+    tube = Patch(facecolor=LIGHT)
     figure.legend([tube, *handles], ["tube", *labels], loc="outside lower center", ncols=5)
     return figure
 
 
-def _names(setting: Setting) -> tuple[str, str] | None:
+def names_of(spec: Spec) -> tuple[str, str] | None:
     """The states of the plane that is drawn: those asked for, else those of an obstacle, else the first two."""
-    spec = setting.spec
     if spec.simulation and spec.simulation.plane:
         return spec.simulation.plane
     if spec.obstacles:
@@ -98,11 +100,12 @@ def _section(setting: Setting, i: int, j: int) -> Array:
     return np.clip(setting.rho * circle @ np.linalg.cholesky(spread).T, -widths, widths)
 
 
-def _obstacles(axis: Axes, setting: Setting, names: tuple[str, str]) -> None:
+def obstacles(axis: Axes, spec: Spec, names: tuple[str, str]) -> None:
+    """The obstacles in a plane."""
     from matplotlib.patches import Circle, Patch, Polygon
 
     label: str | None = "obstacle"
-    for obstacle in setting.spec.obstacles:
+    for obstacle in spec.obstacles:
         if set(obstacle.states) != set(names):
             continue
         turned = obstacle.states != names

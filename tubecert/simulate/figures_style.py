@@ -5,15 +5,18 @@ Colours are those of Okabe and Ito, told apart by everybody; what is certified i
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from tubecert.digits import near
-from tubecert.simulate.campaign import Campaign, Drawn
-from tubecert.simulate.setting import Setting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from tubecert.simulate.campaign import Campaign, Drawn
+    from tubecert.spec import Spec
 
 COLORS: Final = {
     "l1": "#0072B2",
@@ -42,6 +45,16 @@ STYLE: Final[Any] = {
     "legend.fontsize": 8,
     "savefig.dpi": 150,
 }
+FORMATS: Final = ("png", "svg")
+
+
+def images(name: str, figure: Figure) -> Iterator[tuple[str, bytes]]:
+    """The files of a figure: the same bytes for the same data."""
+    for kind in FORMATS:
+        buffer = BytesIO()
+        metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+        figure.savefig(buffer, format=kind, metadata=metadata)
+        yield f"{name}.{kind}", buffer.getvalue()
 
 
 def blank(width: float, height: float) -> Figure:
@@ -69,10 +82,10 @@ def line(item: Drawn) -> LineStyle:
     return {"color": COLORS[controller], "ls": style, "label": NAMES[controller]}
 
 
-def labelled(setting: Setting, name: str) -> str:
-    """A state or input with its unit, as far as the specification tells."""
-    unit = dict(setting.spec.units).get(name)
-    return f"{name} [{unit}]" if unit else name
+def labelled(spec: Spec, name: str, words: str = "") -> str:
+    """A state or input, or `words` about it, with its unit, as far as the specification tells."""
+    unit = dict(spec.units).get(name)
+    return f"{words or name} [{unit}]" if unit else words or name
 
 
 def title(campaign: Campaign) -> str:
@@ -85,6 +98,11 @@ def finish(figure: Figure, bottom: Axes, legend: Axes, campaign: Campaign) -> No
     """Time on the axes at the bottom, the title over those whose labels become the legend."""
     bottom.set_xlabel("t [s]")
     bottom.set_xlim(0, campaign.setting.horizon)
-    legend.set_title(title(campaign), fontsize=9, loc="left")
-    handles, labels = legend.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    titled(figure, legend, title(campaign), 3)
+
+
+def titled(figure: Figure, axis: Axes, words: str, columns: int) -> None:
+    """A title, and the labels of an axis as the legend."""
+    axis.set_title(words, fontsize=9, loc="left")
+    handles, labels = axis.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)

@@ -8,19 +8,22 @@ import io
 import json
 import math
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TargetError
 from tubecert.files import replace
 from tubecert.findings import Finding
-from tubecert.simulate.campaign import Attack, Campaign, Drawn
-from tubecert.simulate.runs import Runs
-from tubecert.simulate.summary import summary
+from tubecert.records import Json
+
+if TYPE_CHECKING:
+    from tubecert.simulate.campaign import Attack, Campaign, Drawn
+    from tubecert.simulate.runs import Runs
 
 SUMMARY: Final = "summary.json"
 
@@ -38,7 +41,7 @@ def prepared(folder: str) -> Iterator[None]:
         with tempfile.TemporaryFile(dir=path):
             pass
     except (OSError, ValueError) as error:
-        raise unwritable(folder, error) from None
+        raise _unwritable(folder, error) from None
     try:
         yield
     finally:
@@ -48,20 +51,24 @@ def prepared(folder: str) -> Iterator[None]:
 
 
 def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
-    """Writes every file, the summary last, so that a folder with a summary is complete; returns their names.
+    """Writes every file of a campaign; returns their names. Raises `TargetError`."""
+    return written_to(folder, _files(campaign, certificate), _outdated(campaign))
+
+
+def written_to(folder: str, files: Iterable[tuple[str, bytes]], outdated: Sequence[str] = ()) -> list[str]:
+    """Writes files, the summary last, so that a folder with a summary is complete; returns their names.
 
     Raises `TargetError`.
     """
     written = []
     try:
-        (Path(folder) / SUMMARY).unlink(missing_ok=True)  # of earlier files, which are now replaced
-        for name in _outdated(campaign):
+        for name in (SUMMARY, *outdated):  # of earlier files, which are now replaced
             (Path(folder) / name).unlink(missing_ok=True)
-        for name, data in _files(campaign, certificate):
+        for name, data in files:
             replace(Path(folder) / name, data)
             written.append(name)
     except OSError as error:
-        raise unwritable(folder, error) from None
+        raise _unwritable(folder, error) from None
     return written
 
 
@@ -74,8 +81,9 @@ def _outdated(campaign: Campaign) -> list[str]:
 
 def _files(campaign: Campaign, certificate: str) -> Iterator[tuple[str, bytes]]:
     from tubecert.simulate.figures import figures
+    from tubecert.simulate.summary import summary
 
-    yield "runs.npz", _npz(_arrays(campaign))
+    yield "runs.npz", npz(_arrays(campaign))
     for item in campaign.drawn:
         yield f"{item.loop.controller}.csv", _table(*_drawn_table(campaign, item))
     for attack in campaign.attacks:
@@ -83,8 +91,12 @@ def _files(campaign: Campaign, certificate: str) -> Iterator[tuple[str, bytes]]:
             yield f"monte_carlo_{attack.loop.controller}.csv", _table(*_sample_table(campaign, attack))
     if not campaign.interrupted:
         yield from figures(campaign)
-    text = json.dumps(summary(campaign, certificate).to_json(), indent=1, sort_keys=True, allow_nan=False)
-    yield SUMMARY, (text + "\n").encode()
+    yield told(summary(campaign, certificate).to_json())
+
+
+def told(summary: Json) -> tuple[str, bytes]:
+    """The file of a summary."""
+    return SUMMARY, (json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n").encode()
 
 
 def _arrays(campaign: Campaign) -> dict[str, Array]:
@@ -116,7 +128,8 @@ def _named(prefix: str, runs: Runs) -> dict[str, Array]:
     }
 
 
-def _npz(arrays: dict[str, Array]) -> bytes:
+def npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Arrays as the bytes of a file of numpy."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
     return buffer.getvalue()
@@ -176,7 +189,7 @@ def _cell(value: float) -> str:
     return f"{value:.0f}" if value == int(value) and abs(value) < 1e15 else f"{value:.9g}"
 
 
-def unwritable(folder: str, error: Any) -> TargetError:
+def _unwritable(folder: str, error: Any) -> TargetError:
     """The error for a folder that cannot be written to."""
     why = (getattr(error, "strerror", None) or str(error)).lower()
     message = f"cannot write to the folder {folder}: {why}"

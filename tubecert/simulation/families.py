@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulation.engine import integrated
-from tubecert.simulation.kernels import flow
+from tubecert.loop_design.widths import flow
 from tubecert.simulation.setting import Setting
 from tubecert.spec.types import Bundle
 
+Slope: TypeAlias = Callable[[float, Array], Array]
 _AFTER: Final = 1e-9  # of a sample time after its left end: there u* has jumped
 _RICCATI: Final = 2000  # steps of the recursion
 _FULL: Final = 0.7  # of all waves are as large as they may be
@@ -42,7 +42,7 @@ class Course:
 
 def course_of(setting: Setting) -> Course:
     """The plan of a specification that is no family."""
-    Ts, nodes, plan, claim = setting.Ts, setting.nominal.nodes, setting.loop.plan, setting.result.claim
+    Ts, plan, claim, K = setting.Ts, setting.loop.plan, setting.result.claim, setting.samples
     end = None if plan.horizon is None else float(plan.horizon)
 
     def at(t: Array) -> tuple[Array, Array]:
@@ -53,54 +53,49 @@ def course_of(setting: Setting) -> Course:
         x, u = plan.enclose(t, t)
         return x.mid[:, :, None], u.mid[:, :, None]
 
-    t = np.append((np.arange(setting.samples)[:, None] * Ts + nodes[:-1]).ravel(), setting.samples * Ts)
-    acts = float(setting.loop.rest) + np.arange(-1, setting.samples + setting.loop.whole) * Ts
+    nodes = np.array(setting.nodes[:-1], dtype=float)
+    acts = float(setting.loop.rest) + np.arange(-1, K + setting.loop.whole) * Ts
     low, high = np.maximum(acts, 0.0), acts + Ts
     moving = claim.hold == "continuous" and not plan.is_constant
     return Course(
-        x=at(t)[0],
+        x=at(np.append(np.add.outer(np.arange(K) * Ts, nodes), K * Ts))[0],
         held=at(low + _AFTER * Ts if claim.hold == "left" else (low + high) / 2)[1],
-        ends=np.full(1, setting.samples + 1),
+        ends=np.full(1, K + 1),
         inputs=(lambda t: at(np.full(1, t))[1][0]) if moving else None,
     )
 
 
 def courses(setting: Setting, bundle: Bundle, draws: Array) -> Course:
-    """A random plan for every lane from its draws, `numbers(setting)` of each (.., N); N plans."""
-    own, (n, m), K = setting.nominal, setting.nominal.B.shape, setting.samples
+    """A random plan for every lane from its draws, `drawn(setting)` of each (.., N); N plans."""
+    (n, m), K, acts, hold = setting.loop.B.shape, setting.samples, setting.acts, setting.result.claim.hold
     steer = _Steering.of(setting, *(np.array(box, dtype=float) for box in (bundle.x, bundle.u)))
     rate = None if bundle.input_rate is None else np.array(bundle.input_rate, dtype=float)[:, None]
-    x, u = steer.inside(draws[-n:]), np.repeat(steer.Q.mean(axis=1)[:, None], draws.shape[1], axis=1)
+    x, u = steer.inside(draws[-n:]), steer.input_middle + np.zeros((1, draws.shape[1]))
     path, held, ends = [x], [], np.full(draws.shape[1], K + 1)
-    for k in range(K + own.whole + 1):
+    for k in range(K + setting.loop.whole + 1):
         wish = waves(draws[:-n], K, k)
-        asked = steer.input(x, wish[:m])
-        lengths = own.lengths[: own.acts] if k == 0 else np.roll(own.lengths, -own.acts)
-        most = np.inf if rate is None else rate * lengths.sum()
-        first, u = asked if rate is None else u, np.clip(asked, u - most, u + most)
+        lengths = setting.lengths[:acts] if k == 0 else np.roll(setting.lengths, -acts)
+        asked, most = steer.input(x, wish[:m]), lengths.sum() * (0.0 if rate is None else rate)
+        first, u = (asked, asked) if rate is None else (u, np.clip(asked, u - most, u + most))
         slope = partial(_slope, setting, (first, u, lengths.sum()), float(bundle.defect) * wish[m:])
         for begin, length in zip((np.cumsum(lengths) - lengths).tolist(), lengths.tolist(), strict=True):
             x = integrated(slope, begin, x, length, 2)
             path.append(x)
-        held.append(first if setting.result.claim.hold == "left" else (first + u) / 2)
+        held.append(first if hold == "left" else (first + u) / 2)
         ends = np.where(steer.within(x), ends, np.minimum(ends, max(0, k - 1)))
-    return Course(x=np.stack(path[: K * len(own.lengths) + 1]), held=np.stack(held), ends=ends)
+    return Course(x=np.stack(path[: K * len(setting.lengths) + 1]), held=np.stack(held), ends=ends)
 
 
 def _slope(setting: Setting, ramp: tuple[Array, Array, float], missed: Array, t: float, x: Array) -> Array:
     """x*' of lanes whose inputs go from the first (m, N) to the last in so many s, with what is missed (n, N)."""
-    lanes = np.ones((1, x.shape[1]))
-    middle, still = (
-        setting.ranges.mean(axis=1)[:, None] * lanes,
-        np.zeros((setting.loop.E.shape[1], 1)) * lanes,
-    )
     now = ramp[0] + t / ramp[2] * (ramp[1] - ramp[0])
-    return setting.plant.run_floats([*x, *middle, *now, *still], x[0].shape) + missed
+    still = np.zeros(setting.loop.E.shape[1])
+    return setting.plant.run_floats([*x, *setting.ranges.mean(axis=1), *now, *still], x[0].shape) + missed
 
 
-def numbers(setting: Setting) -> int:
+def drawn(setting: Setting) -> int:
     """How many draws a plan of a family needs."""
-    n, m = len(setting.spec.states), len(setting.spec.inputs)
+    n, m = setting.loop.states, setting.loop.inputs
     return 3 * (n + m) + n
 
 
@@ -111,24 +106,36 @@ def waves(draws: Array, samples: int, k: float) -> Array:
     return np.asarray(np.where(size < _FULL, 1.0, (size - _FULL) / (1 - _FULL)) * sign)
 
 
+def integrated(slope: Slope, t: float, x: Array, length: float, count: int) -> Array:
+    """The states (n, N) a `length` later, by `count` steps of the classical Runge-Kutta method."""
+    h = length / count
+    for s in (t + i * h for i in range(count)):
+        a = slope(s, x)
+        b = slope(s + h / 2, x + h / 2 * a)
+        c = slope(s + h / 2, x + h / 2 * b)
+        d = slope(s + h, x + h * c)
+        x = x + h / 6 * (a + 2 * (b + c) + d)
+    return x
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Steering:
-    """What keeps plans in P (n, 2): inputs in Q (m, 2) as wished, but more and more a `gain` (m, n) near its edge.
+    """What keeps plans in P: inputs in Q as wished, but more and more by a `gain` (m, n) near its edge.
 
-    Near is what the `value` (n, n) of the linear-quadratic problem with these boxes as weights says, against `level`,
-    the largest at which its ellipsoid fits into P.
+    Boxes are columns, middles and half sides. Near the edge is where off' `value` off, by the linear-quadratic problem
+    with the boxes as weights, nears 1, which it has where its ellipsoid leaves P.
     """
 
-    P: Array
-    Q: Array
+    middle: Array
+    half: Array
+    input_middle: Array
+    input_half: Array
     gain: Array
     value: Array
-    level: float
 
     @classmethod
     def of(cls, setting: Setting, P: Array, Q: Array) -> _Steering:
-        A, integral = flow(setting.nominal.A, setting.Ts)
-        B = integral @ setting.nominal.B
+        A, B = flow(setting.loop.A, setting.loop.B, setting.Ts)
         size, reach = (np.maximum(np.ptp(box, axis=1) / 2, _TINY) for box in (P, Q))
         weight, cost = np.diag(1 / size**2), np.diag(1 / reach**2)
         value: Array = weight
@@ -137,27 +144,29 @@ class _Steering:
             gain = np.asarray(np.linalg.solve(cost + B.T @ value @ B, B.T @ value @ A))
             value = np.asarray(weight + A.T @ value @ (A - B @ gain))
         free = size > _TINY
-        level = float((size[free] ** 2 / np.diag(np.linalg.inv(value))[free]).min(initial=np.inf))
-        return cls(P=P, Q=Q, gain=gain, value=value, level=level)
+        level = (size[free] ** 2 / np.diag(np.linalg.inv(value))[free]).min(initial=np.inf)
+        (middle, half), (input_middle, input_half) = (
+            (box.mean(axis=1)[:, None], np.ptp(box, axis=1)[:, None] / 2) for box in (P, Q)
+        )
+        boxes = {"middle": middle, "half": half, "input_middle": input_middle, "input_half": input_half}
+        return cls(**boxes, gain=gain, value=value / level)
 
     def within(self, x: Array) -> Array:
         """Which lanes are in P, (N,)."""
-        return np.asarray(((x >= self.P[:, :1]) & (x <= self.P[:, 1:])).all(axis=0))
+        return np.asarray((abs(x - self.middle) <= self.half).all(axis=0))
 
     def inside(self, draws: Array) -> Array:
         """Where plans start, (n, N)."""
-        off = (2 * draws - 1) * np.ptp(self.P, axis=1)[:, None] / 2
-        nearer = np.sqrt(_EDGE[0] / np.maximum(self._share(off), _EDGE[0]))
-        return np.asarray(self.P.mean(axis=1)[:, None] + off * nearer)
+        off = (2 * draws - 1) * self.half
+        return np.asarray(self.middle + off * np.sqrt(_EDGE[0] / np.maximum(self._out(off), _EDGE[0])))
 
     def input(self, x: Array, wish: Array) -> Array:
         """u* (m, N) in Q for wishes (m, N) from -1 to 1 of it."""
-        off = x - self.P.mean(axis=1)[:, None]
-        near = np.clip((self._share(off) - _EDGE[0]) / (_EDGE[1] - _EDGE[0]), 0, 1)
-        wished = wish * np.ptp(self.Q, axis=1)[:, None] / 2
-        u = self.Q.mean(axis=1)[:, None] + (1 - near) * wished - near * (self.gain @ off)
-        return np.asarray(np.clip(u, self.Q[:, :1], self.Q[:, 1:]))
+        off = x - self.middle
+        near = np.clip((self._out(off) - _EDGE[0]) / (_EDGE[1] - _EDGE[0]), 0, 1)
+        pushed = (1 - near) * wish * self.input_half - near * (self.gain @ off)
+        return np.asarray(self.input_middle + np.clip(pushed, -self.input_half, self.input_half))
 
-    def _share(self, off: Array) -> Array:
+    def _out(self, off: Array) -> Array:
         """How far out points (n, N) off the middle are: 1 where the ellipsoid ends."""
-        return np.asarray(np.einsum("in,ij,jn->n", off, self.value, off) / self.level)
+        return np.asarray(np.einsum("in,ij,jn->n", off, self.value, off))

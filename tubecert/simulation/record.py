@@ -44,7 +44,7 @@ class Violation:
     of: str
     run: int
     t: float
-    value: float | None
+    value: float
     bound: float
     aimed: str
 
@@ -98,8 +98,8 @@ class Summary:
     @property
     def attained(self) -> float:
         """The largest share of any half-width."""
-        peaks = [p for own in self.states.values() for p in (own.random, own.adversary) if p is not None]
-        return max((p.share for p in peaks), default=0.0)
+        peaks = (peak for own in self.states.values() for peak in (own.random, own.adversary) if peak)
+        return max((peak.share for peak in peaks), default=0.0)
 
     def to_json(self) -> Json:
         """The file's content."""

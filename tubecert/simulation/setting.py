@@ -15,10 +15,9 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import symbol
 from tubecert.expression.matrix import column, combine, multiply
 from tubecert.model import TIME, build
-from tubecert.sampled_loop.record import Result, Tables
-from tubecert.sampled_loop.remainders import Remainders
-from tubecert.sampled_loop.setting import Loop, Size
-from tubecert.simulation.kernels import Nominal
+from tubecert.sampled_loop.record import Result
+from tubecert.sampled_loop.remainders import Remainders, Sizes
+from tubecert.sampled_loop.setting import Controller, Loop, Size
 from tubecert.spec import Knots, Spec
 from tubecert.trajectory.make import plan_of
 
@@ -27,38 +26,26 @@ _SAMPLES: Final = (50, 20_000)  # of such a run, at least and at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Band:
-    """Slow signals: |.| <= `size` (r,), |.'| <= `rate` (r,), and |.| <= `first` (r,) at the start.
-
-    Those of h act beside the inputs `matched`, the others are the wind.
-    """
-
-    size: Array
-    rate: Array
-    first: Array
-    matched: tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
     """All of a simulation that its runs share: n states, m inputs, k columns of the wind, p parameters.
 
-    Runs have `samples` K, of P parts each. `plant` gives x' of states, parameters, u + h, wind; `own` is the
-    specification's h of states and t; `ranges` (p, 2). From sample `stages[g]` on, |x - x*| and |u - u*| are at most
-    `bounds[g]` (G, n + m).
+    Runs have `samples` K, of the parts between `nodes`, at one of which inputs change, `rest`. `plant` gives x' of
+    states, parameters, u + h, wind; `own` is the specification's h of states and t; `ranges` (p, 2). `slow` signals (r)
+    enter u and wind by `spread` (m + k, r). From sample `stages[g]` on, |x - x*| and |u - u*| are at most `bounds[g]`.
     """
 
     loop: Loop
     result: Result
-    tables: Tables
+    tables: Controller
     samples: int
-    nominal: Nominal
+    nodes: tuple[Fraction, ...]
     plant: Tape
     own: Tape | None
     ranges: Array
+    slow: Sizes
+    spread: Array
     stages: Array
     bounds: Array
-    band: Band
 
     @property
     def spec(self) -> Spec:
@@ -76,6 +63,16 @@ class Setting:
         return float(self.loop.sample_time)
 
     @property
+    def lengths(self) -> Array:
+        """Of the parts of a sample, in s."""
+        return np.diff(np.array(self.nodes, dtype=float))
+
+    @property
+    def acts(self) -> int:
+        """The part with which the input changes."""
+        return self.nodes.index(self.loop.rest)
+
+    @property
     def gusts(self) -> Size:
         """The wind that may jump, (k,)."""
         own = self.loop.gusts
@@ -90,39 +87,39 @@ def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> 
     """The setting of a result that has a tube; runs last `duration` s, or as long as the claim."""
     if result.nominal is None or result.controller is None:
         raise ValueError("there is no loop without tables")
-    model, own = build(spec), result.planned
-    matrices = {name: getattr(result.nominal, name).value for name in "ABE"}
-    knots = None if own is None else Knots(t=own.t, x=own.x, u=own.u, interpolation=own.interpolation)
-    slow = result.recipe is None or result.recipe.parameters == "slow"
-    loop = Loop(spec=spec, model=model, plan=plan_of(spec, model, knots), knots=own, slow=slow, **matrices)
-    arrays = {name: getattr(result.controller, name).value for name in "FGMN"}
-    nodes = _nodes(loop)
-    acts = nodes.index(loop.rest)
-    widths = [[own.half_widths[x] for x in spec.states] for own in result.tube]
-    deviations = [[own.deviations[u] for u in spec.inputs] for own in result.tube]
-    bounds = np.hstack([np.array(widths, dtype=float), np.array(deviations, dtype=float)])
+    model, plan = build(spec), result.planned
+    knots = None if plan is None else Knots(t=plan.t, x=plan.x, u=plan.u, interpolation=plan.interpolation)
+    loop = Loop(
+        spec=spec,
+        model=model,
+        plan=plan_of(spec, model, knots),
+        knots=plan,
+        slow=result.recipe is None or result.recipe.parameters == "slow",
+        **{name: getattr(result.nominal, name).value for name in "ABE"},
+    )
+    tube = [{**stage.half_widths, **stage.deviations} for stage in result.tube]
+    bounds = np.array([[own[name] for name in (*spec.states, *spec.inputs)] for own in tube], dtype=float)
     return Setting(
         loop=loop,
         result=result,
-        tables=result.controller,
+        tables=Controller.of(result.controller),
         samples=_samples(loop, result, duration),
-        nominal=Nominal(
-            **matrices, **arrays, nodes=np.array(nodes, dtype=float), acts=acts, whole=loop.whole
-        ),
+        nodes=_nodes(loop),
         plant=_plant(loop),
         own=None if model.h is None else Tape(model.h, (*spec.states, TIME)),
         ranges=np.array([ends for _, ends in spec.ranges], dtype=float).reshape(-1, 2),
+        slow=_slow(loop, result, bounds[:, : loop.states].max(axis=0)),
+        spread=np.eye(loop.inputs + loop.E.shape[1])[:, _entered(loop)],
         stages=np.array([stage.start for stage in result.tube]),
         bounds=bounds,
-        band=_band(loop, result, bounds[:, : loop.states].max(axis=0)),
     )
 
 
-def _nodes(loop: Loop) -> list[Fraction]:
+def _nodes(loop: Loop) -> tuple[Fraction, ...]:
     """The ends of the parts of a sample: where an input takes over, and halves of what is long."""
     ends = sorted({Fraction(0), loop.rest, loop.sample_time})
     halves = {(a + b) / 2 for a, b in pairwise(ends) if b - a > loop.sample_time / 2}
-    return sorted({*ends, *halves})
+    return tuple(sorted({*ends, *halves}))
 
 
 def _samples(loop: Loop, result: Result, duration: Fraction | None) -> int:
@@ -139,23 +136,26 @@ def _samples(loop: Loop, result: Result, duration: Fraction | None) -> int:
 def _plant(loop: Loop) -> Tape:
     """x' of states, parameters, u + h (m), w (k)."""
     model, k = loop.model, loop.E.shape[1]
-    inputs, gusts = [f"u#{j}" for j in range(loop.inputs)], [f"w#{j}" for j in range(k)]
-    slope = combine(
-        1, column(loop.drift), 1, multiply(loop.gained, column([symbol(name) for name in inputs]))
-    )
-    if k:
-        slope = combine(1, slope, 1, multiply(model.E, column([symbol(name) for name in gusts])))
-    names = (*model.states, *(name for name, _ in model.parameters), *inputs, *gusts)
+    pushes = [f"{kind}#{j}" for kind, count in (("u", loop.inputs), ("w", k)) for j in range(count)]
+    columns = [(*B, *E) for B, E in zip(loop.gained, model.E or [()] * loop.states, strict=True)]
+    slope = combine(1, column(loop.drift), 1, multiply(columns, column([symbol(name) for name in pushes])))
+    names = (*model.states, *(name for name, _ in model.parameters), *pushes)
     return Tape([row[0] for row in slope], names)
 
 
-def _band(loop: Loop, result: Result, widest: Array) -> Band:
+def _entered(loop: Loop) -> list[int]:
+    """Which inputs, and components of the wind after these, the slow signals act beside."""
+    return [*loop.matched, *(loop.inputs + np.arange(loop.E.shape[1] if loop.sways else 0)).tolist()]
+
+
+def _slow(loop: Loop, result: Result, widest: Array) -> Sizes:
     """h and the wind where their rates are known: as the theorem bounds them on the tube; a sudden h has no rate."""
     found = Remainders(loop, result.recipe.windows if result.recipe else 1).sizes(widest)
-    count = len(found.size) - (len(loop.unknown) if loop.slow else 0)
-    parts = [part[:count] for part in (found.size, found.rate, found.first)]
-    if loop.jumps and loop.matched:
+    jumps = loop.jumps and loop.matched
+    kept = len(_entered(loop)) - (len(loop.matched) if jumps else 0)  # behind these are parameters
+    parts = [part[:kept] for part in (found.size, found.rate, found.first)]
+    if jumps:
         most = loop.sudden[-1][1]
         size = most.each / np.sqrt(len(most.each) if most.length else 1)
-        parts = [np.append(own, part) for own, part in zip((size, size * np.inf, size), parts, strict=True)]
-    return Band(size=parts[0], rate=parts[1], first=parts[2], matched=loop.matched)
+        parts = [np.append(new, part) for part, new in zip(parts, (size, size * np.inf, size), strict=True)]
+    return Sizes(*parts)
