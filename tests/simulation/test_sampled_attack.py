@@ -37,13 +37,13 @@ def test_a_slow_signal_does_its_worst_as_a_linear_program_says(rate):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["scalar", "cart"])
 def test_a_loop_without_remainders_is_driven_to_its_edge_and_not_beyond(name):
-    found = simulate(setting(name), "hash", runs=30, seed=0).summary
+    found = simulate(setting(name), "hash", runs=30, seed=0)
     assert found.outcome == "not falsified"
     assert found.error < 1e-6
-    for own in (*found.states.values(), *found.inputs.values()):
-        assert 0.95 < own.adversary.share <= 1
-        assert own.adversary_by_stage[-1] > 0.93
-        assert own.random.share <= 1
+    assert (found.by_stage[1, :, -1] > 0.93).all()
+    for i in range(len(found.setting.names)):
+        assert 0.95 < found.peak(i, found.aimed).share <= 1
+        assert found.peak(i, ~found.aimed).share <= 1
 
 
 @pytest.mark.slow
@@ -52,7 +52,7 @@ def test_signals_and_starts_keep_to_their_bounds_however_small_kernels_are():
     np.testing.assert_allclose(worst_of(np.array([[3e-170, -4e-170]]), True), [[0.6, -0.8]])
     attack = Attack(setting=setting("pendulum", duration="3"), seed=0)
     lanes = attack.lanes(0, len(attack.aims) + 20)
-    starts = np.linalg.norm(lanes.start, axis=0)
+    starts = np.linalg.norm(lanes.off, axis=0)
     assert starts[lanes.aimed] == pytest.approx(0.02, rel=1e-12)
     assert starts.max() <= 0.02 * (1 + 1e-12)
     for k in (0, 1, 149):
@@ -73,12 +73,12 @@ def sabotaged(how):
 @pytest.mark.parametrize("how", ["h", "sign", "width"])
 def test_a_lie_is_found_with_seed_run_and_time(how):
     own = sabotaged(how)
-    found = simulate(own, "hash", runs=20, seed=4).summary
-    assert (found.outcome, found.seed) == ("falsified", 4)
+    found = simulate(own, "hash", runs=20, seed=4)
+    assert (found.outcome, found.summary["seed"]) == ("falsified", 4)
     first = found.violations[0]
     attack = Attack(setting=own, seed=4)
-    again = campaign.chunk(attack, attack.lanes(first.run, first.run + 1))
-    assert again.left[0] == first.t
+    again = campaign.chunk(attack, attack.lanes(first.peak.run, first.peak.run + 1))
+    assert again.left[0] == first.peak.t
     assert own.names[again.what[0]] == first.of
 
 
@@ -96,7 +96,7 @@ def test_what_is_finished_stays_and_the_same_seed_says_the_same(monkeypatch):
     whole, some = simulate(own, "h", runs=60, seed=1), simulate(own, "h", runs=60, seed=1, report=stop)
     assert (some.outcome, some.runs, told) == ("interrupted", 64, [0, 32, 64])
     np.testing.assert_array_equal(whole.all("share")[:, :64], some.all("share"))
-    assert whole.summary.to_json()["states"]["x"]["random_by_stage"]
+    assert whole.summary["states"]["x"]["random_by_stage"]
     assert (simulate(own, "h", runs=60, seed=2).all("share")[:, 60:] != whole.all("share")[:, 60:]).any()
 
 
@@ -107,7 +107,7 @@ def test_inputs_and_obstacles_are_judged_as_well():
     narrow = replace(own.result, inputs=(replace(use, range=(Fraction(-1, 10), use.range[1])),))
     near = replace(own, result=narrow)
     assert simulate(near, "h", runs=0, seed=0).outcome == "falsified"
-    assert simulate(own, "h", runs=0, seed=0).summary.obstacles[0].distance > 1
+    assert simulate(own, "h", runs=0, seed=0).passed[0].distance > 1
     touched = setting("cart", ("center: [2, 0]", "center: [0.5, 0]"))
     assert proven("cart").clearance[0].verdict.value == "certified"
     assert simulate(touched, "h", runs=0, seed=0).outcome == "falsified"

@@ -1,6 +1,5 @@
 """The driver of the sampled loop and the engine: against other integrators, and exact exponentials."""
 
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -13,7 +12,7 @@ from scipy.linalg import expm
 from tubecert.simulation import sampled
 from tubecert.simulation.attack import Attack
 from tubecert.simulation.families import course_of, courses
-from tubecert.simulation.sampled import Linear
+from tubecert.simulation.sampled import linear
 
 
 class Scripted(Attack):
@@ -33,8 +32,8 @@ def run(own, course=None):
     """Three lanes, all of them drawn."""
     attack = Scripted(setting=own, seed=0)
     lanes = attack.lanes(len(attack.aims), len(attack.aims) + 3)
-    lanes = replace(lanes, own=np.full(3, own.own is not None), number=np.zeros(3, int))
-    seen = sampled.run(attack, lanes, course or course_of(own), partial(Linear, own.tables), 2)
+    lanes = lanes._replace(own=np.full(3, own.own is not None), number=np.zeros(3, int))
+    seen = sampled.run(attack, lanes, course or course_of(own), partial(linear, own.tables), 2)
     return seen, lanes, attack
 
 
@@ -45,7 +44,7 @@ def test_commands_act_after_their_delay_as_matrix_exponentials_say(delay):
     own = setting("cart", ("delay: 0.02", f"delay: {delay}"), ("0.2*sin(t)", "0"), duration="2")
     found, lanes, attack = run(own)
     Ts, tau, N = 0.05, float(delay), proven("cart").controller.N.value
-    x = lanes.start
+    x = lanes.off
     commands: dict[int, np.ndarray] = {}
     for k in range(own.samples):
         commands[k] = N @ (x + attack.noise(lanes, k))
@@ -65,7 +64,7 @@ def test_a_nonlinear_plant_is_integrated_as_by_another_method():
     draws = np.random.default_rng(1).random((3 * 3 + 2, 3))
     found, lanes, attack = run(own, courses(own, own.spec.trajectory.bundle, draws))
     course, N, Ts = found.course, proven("pendulum").controller.N.value, 0.02
-    g, commands, x = lanes.parameters[0], [np.zeros((1, 3))], course.x[0] + lanes.start
+    g, commands, x = lanes.parameters[0], [np.zeros((1, 3))], course.x[0] + lanes.off
     for k in range(own.samples):
         plan = course.x[k * len(own.lengths)]
         commands.append(N @ (x + attack.noise(lanes, k) - plan))

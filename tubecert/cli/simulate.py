@@ -103,7 +103,8 @@ def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Out
     from tubecert.library.reading import read
     from tubecert.library.sampled import SampledCertification, certified
     from tubecert.library.simulating import sampled_of
-    from tubecert.report import sampled_simulation
+    from tubecert.report.sampled_simulation import report as report_of
+    from tubecert.report.sampled_simulation import verdict_line
     from tubecert.simulate.output import prepared
 
     words = {name: getattr(given, name) for name in ("metric", "scheduler", "controllers", "gains", "plan")}
@@ -121,14 +122,14 @@ def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Out
         simulation = sampled_of(found, system, numbers, report)
         if not simulation.runs:
             return ExitCode.INTERRUPTED
-        data, files = simulation.found, simulation.save(folder)
+        files = simulation.save(folder)
     present(
         output,
-        sampled_simulation.verdict_line(data),
-        lambda: sampled_simulation.report(data, folder=folder, files=files, verbose=output.verbose),
-        _json(data.to_json()) if output.json else None,
+        verdict_line(simulation.campaign),
+        lambda: report_of(simulation.campaign, folder=folder, files=files, verbose=output.verbose),
+        _json(simulation.summary) if output.json else None,
     )
-    return _CODES.get(data.outcome, ExitCode.CERTIFIED)
+    return _CODES.get(simulation.outcome, ExitCode.CERTIFIED)
 
 
 def _folder(given: Given) -> str:

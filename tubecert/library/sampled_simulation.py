@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tubecert.simulation.campaign import Campaign
-    from tubecert.simulation.record import Summary
-    from tubecert.simulation.sampled import Controllers
+    from tubecert.simulation.sampled import Controllers, Step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,14 +49,9 @@ class SampledSimulation:
         return self.campaign.runs
 
     @property
-    def found(self) -> Summary:
-        """Everything that was found, as a record; there is none before the first runs are finished."""
-        return self.campaign.summary
-
-    @property
     def summary(self) -> Json:
-        """The same as plain data."""
-        return self.found.to_json()
+        """Everything that was found, as plain data; there is none before the first runs are finished."""
+        return self.campaign.summary
 
     def figure(self, name: str = "tube_use") -> Figure:
         """A figure: `tube_use` or `plane`; draw into its axes what you like.
@@ -82,7 +76,7 @@ class SampledSimulation:
     def __str__(self) -> str:
         from tubecert.report.sampled_simulation import verdict_line
 
-        return verdict_line(self.found).plain
+        return verdict_line(self.campaign).plain
 
     def __repr__(self) -> str:
         return f"<SampledSimulation: {self}>"
@@ -91,9 +85,11 @@ class SampledSimulation:
         from tubecert.report import notebook
 
         shares = self.campaign.all("share").max(axis=1)
-        names = self.campaign.setting.names
-        rows = [(name, f"largest share {short(share)}") for name, share in zip(names, shares, strict=True)]
-        return notebook.of_line(str(self), self.found.name, "falsified" if self.falsified else "", rows)
+        own, style = self.campaign.setting, "falsified" if self.falsified else ""
+        rows = [
+            (name, f"largest share {short(share)}") for name, share in zip(own.names, shares, strict=True)
+        ]
+        return notebook.of_line(str(self), own.spec.name, style, rows)
 
 
 def simulated(
@@ -135,11 +131,15 @@ def _compiled(certificate: Certificate) -> Controllers | None:
     """The exported C code as the controller; None where there is none to export, or no compiler."""
     from tubecert.controller.compiled import Controller
     from tubecert.controller.data import data_of
-    from tubecert.simulation.sampled import Compiled
 
     try:
         data = data_of(certificate)
         Controller(data)
     except TubecertError:
         return None
-    return lambda lanes: Compiled(Controller(data, lanes), handed=data.plan.at is None)
+
+    def made(lanes: int) -> Step:
+        code, handed = Controller(data, lanes), data.plan.at is None
+        return lambda y, x, u: code.step(y.T, *((x.T, u.T) if handed else ())).T
+
+    return made

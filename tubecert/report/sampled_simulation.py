@@ -10,78 +10,78 @@ from rich.text import Text
 from tubecert.digits import down, short, up
 from tubecert.report.layout import indented, plain_table
 from tubecert.report.simulation import CAVEAT, STYLES
-from tubecert.simulation.record import Attained, Summary, Violation
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
+    from tubecert.simulation.campaign import Campaign, Violation
+
 _CODES = {"c": "the controller is the exported C code", "floats": "the controller's tables in floats"}
 
 
-def verdict_line(data: Summary) -> Text:
+def verdict_line(own: Campaign) -> Text:
     """The outcome on one line."""
     line = Text(no_wrap=True, overflow="ignore")
-    line.append(data.outcome, style=STYLES[data.outcome])
-    line.append(f" {data.name}: ", style="bold")
-    return line.append(_because(data))
+    line.append(own.outcome, style=STYLES[own.outcome])
+    line.append(f" {own.setting.spec.name}: ", style="bold")
+    return line.append(_because(own))
 
 
-def report(data: Summary, *, folder: str, files: Sequence[str], verbose: bool) -> list[RenderableType]:
+def report(own: Campaign, *, folder: str, files: Sequence[str], verbose: bool) -> list[RenderableType]:
     """The whole report as renderables; `folder` holds the `files`."""
-    about = f"{data.adversaries} adversaries and {data.runs - data.adversaries} random runs"
+    aimed, lasts = int(own.aimed.sum()), short(own.setting.samples * own.setting.Ts)
+    about = f"{aimed} adversaries and {own.runs - aimed} random runs over {lasts} s, seed {own.attack.seed}"
     parts: list[RenderableType] = [
         Text(CAVEAT),
-        Text(f"{about} over {short(data.duration)} s, seed {data.seed}; {_CODES[data.controller]}"),
-        *(Text(_violation(own), "red") for own in data.violations[: None if verbose else 3]),
-        _shares(data),
-        *map(Text, _ranges(data)),
+        Text(f"{about}; {_CODES[own.controller]}"),
+        *(Text(_told(violation), "red") for violation in own.violations[: None if verbose else 3]),
+        _shares(own),
+        *map(Text, _ranges(own)),
     ]
     images = " and figures" if any(name.endswith(".png") for name in files) else ""
     where = Text(f"{len(files)} files in {folder}: summary.json, runs.npz{images}")
-    return [verdict_line(data), *map(indented, parts), where]
+    return [verdict_line(own), *map(indented, parts), where]
 
 
-def _because(data: Summary) -> str:
-    runs, attained = f"{data.runs} runs", short(data.attained)
-    match data.outcome:
-        case "falsified" if data.violations:
-            return f"the tube is left in {data.outside} of {runs}, first {_violation(data.violations[0])}"
+def _because(own: Campaign) -> str:
+    runs = f"{own.runs} runs"
+    match own.outcome:
+        case "falsified" if violations := own.violations:
+            return f"the tube is left in {len(own.outside)} of {runs}, first {_told(violations[0])}"
         case "falsified":
             return f"an input or an obstacle is not as certified ({runs})"
         case "no result":
-            error = short(data.error)
+            error = short(own.error)
             return f"an integration is wrong by {error} of a half-width: too much to judge ({runs})"
         case "interrupted":
-            return f"{data.runs} of {data.asked} runs finished, which attained {attained} of the tube"
-    return f"0 of {runs} left the tube, of which {attained} was attained"
+            return (
+                f"{own.runs} of {own.asked} runs finished, which attained {short(own.attained)} of the tube"
+            )
+    return f"0 of {runs} left the tube, of which {short(own.attained)} was attained"
 
 
-def _violation(own: Violation) -> str:
-    who = f"adversary of {own.aimed}" if own.aimed else "random"
-    return f"by {own.of} at t = {short(own.t)} s in run {own.run} ({who}): {short(own.value)}, proven {up(own.bound)}"
+def _told(own: Violation) -> str:
+    who, peak = f"adversary of {own.aimed}" if own.aimed else "random", own.peak
+    where = f"by {own.of} at t = {short(peak.t)} s in run {peak.run} ({who})"
+    return f"{where}: {short(peak.value)}, proven {up(peak.bound)}"
 
 
-def _shares(data: Summary) -> Table:
-    late = [">in the long run"] if len(data.stages) > 1 else []
+def _shares(own: Campaign) -> Table:
+    late = [">in the long run"] if len(own.setting.stages) > 1 else []
     table = plain_table("largest share of what is proven", ">adversaries", ">random runs", *late, "at", "by")
-    for name, own in (*data.states.items(), *data.inputs.items()):
-        table.add_row(name, *_row(own, late=bool(late)))
+    for i, name in enumerate(own.setting.names):
+        peaks = [own.peak(i, own.aimed), own.peak(i, ~own.aimed)]
+        shares = ["" if peak is None else short(peak.share, 3) for peak in peaks]
+        long_run = [short(float(own.by_stage[:, i, -1].max()), 3)] * len(late)
+        most = max(filter(None, peaks), key=lambda peak: peak.share)
+        table.add_row(name, *shares, *long_run, f"t = {short(most.t)} s", f"run {most.run}")
     return table
 
 
-def _row(own: Attained, *, late: bool) -> Iterator[str]:
-    for peak in (own.adversary, own.random):
-        yield "" if peak is None else short(peak.share, 3)
-    if late:
-        yield short(max(own.adversary_by_stage[-1], own.random_by_stage[-1]), 3)
-    most = max(filter(None, (own.adversary, own.random)), key=lambda peak: peak.share)
-    yield from (f"t = {short(most.t)} s", f"run {most.run}")
-
-
-def _ranges(data: Summary) -> Iterator[str]:
-    for name, went in data.went.items():
+def _ranges(own: Campaign) -> Iterator[str]:
+    for name, went in own.went.items():
         proven = went.proven and f", proven to stay in [{down(went.proven[0])}, {up(went.proven[1])}]"
         yield f"{name} went from {short(went.least)} to {short(went.greatest)}{proven or ''}"
-    for passed in data.obstacles:
-        yield f"obstacle {passed.index + 1}: {short(passed.distance)} away at least"
+    for i, passed in enumerate(own.passed, 1):
+        yield f"obstacle {i}: {short(passed.distance)} away at least"

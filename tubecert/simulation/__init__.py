@@ -10,6 +10,6 @@ what they falsify. All runs are lanes of one numpy vector. Trusted: no.
 | `families` | what lanes follow: the plan, or random plans of a family |
 | `attack` | the lanes: adversaries, who know the kernels, and random signals |
 | `sampled` | samples, delay, held inputs; integrated twice, with what is seen of every lane |
-| `campaign` | lanes by chunks, and what they come to |
-| `record`, `figures` | the summary, and the files of a campaign |
+| `campaign` | lanes by chunks, what they come to, and its summary |
+| `figures` | the files of a campaign |
 """

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,23 +27,22 @@ _LAGS: Final = 5000  # of the loop that an adversary looks back, at most
 _SETTLED: Final = 1e-4  # of the largest start: where the loop has forgotten it
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lanes:
+class Lanes(NamedTuple):
     """N runs, by their numbers: which are adversaries (`aimed`), which have the specification's h (`own`), all (N,).
 
-    Adversaries want the greatest or the least (`sign`) of state or input `index` at `sample`. `draws` (.., N) are
-    uniform in [0, 1), by what they are for; `parameters` (p, N), `start` (n, N) about x*(0).
+    Adversaries want the greatest or the least (`sign`) of state or input `target` at `sample`. `draws` (.., N) are
+    uniform in [0, 1), by what they are for; half of the `parameters` (p, N) are corners; `off` (n, N): x(0) - x*(0).
     """
 
     number: Integers
     aimed: Flags
     own: Flags
-    index: Integers
     sample: Integers
+    target: Integers
     sign: Integers
     draws: Mapping[str, Array]
     parameters: Array
-    start: Array
+    off: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,18 +60,19 @@ class Attack:
     @cached_property
     def worst(self) -> Kernels:
         """What does most to each functional, lag by lag, as shares; of all that are longer nothing is known: 0."""
-        own, found, slow = self.setting, self.kernels, np.zeros_like(self.kernels.slow)
+        own, slow = self.setting, np.zeros_like(self.kernels.slow)
         for f, r in np.ndindex(slow.shape[1:]):
             size, rate = float(own.slow.size[r]), float(own.slow.rate[r]) * own.Ts
-            slow[:, f, r] = goals(found.slow[:, f, r], size, rate)
-        noise = worst_of(found.noise, own.loop.noise.length)
-        wind, start = worst_of(found.wind, own.gusts.length), worst_of(found.start, own.loop.start.length > 0)
-        parts = [np.append(part, np.zeros_like(part[:1]), axis=0) for part in (noise, wind, slow, start)]
-        return Kernels(noise=parts[0], wind=parts[1], slow=parts[2], start=parts[3])
+            slow[:, f, r] = goals(self.kernels.slow[:, f, r], size, rate)
+        noise = worst_of(self.kernels.noise, own.loop.noise.length)
+        wind = worst_of(self.kernels.wind, own.gusts.length)
+        start = worst_of(self.kernels.start, own.loop.start.length > 0)
+        parts = (noise, wind, slow, start)
+        return Kernels(*(np.append(part, np.zeros_like(part[:1]), axis=0) for part in parts))
 
     @cached_property
     def aims(self) -> Integers:
-        """Every adversary, (A, 4): whether it has the specification's h, sample, index, sign.
+        """Every adversary, (A, 4): whether it has the specification's h, sample, state or input, sign.
 
         They aim early, where stages begin, and in the long run.
         """
@@ -88,19 +88,15 @@ class Attack:
         """Runs first .. last - 1: adversaries, then random ones."""
         setting, number = self.setting, np.arange(first, last)
         draws, aimed = self._drawn(number), number < len(self.aims)
-        named = np.vstack([self.aims, [0, 0, 0, 1]])[np.minimum(number, len(self.aims))].T
+        rows = np.vstack([self.aims, [0, 0, 0, 1]])[np.minimum(number, len(self.aims))]
+        chosen, sample, target, sign = rows.T
         free = (draws["kind"][0] < 0.5) | (not setting.loop.matched)
-        return Lanes(
-            number=number,
-            aimed=aimed,
-            own=np.where(aimed, named[0], (setting.own is not None) & free).astype(bool),
-            sample=named[1],
-            index=named[2],
-            sign=named[3],
-            draws=draws,
-            parameters=self._parameters(*np.split(draws["parameters"], 2)),
-            start=self._start(draws["start"], aimed, _of(self.worst.start, named[1], *named[2:])),
-        )
+        own = np.where(aimed, chosen, (setting.own is not None) & free).astype(bool)
+        share, kind = np.split(draws["parameters"], 2)
+        low, high = setting.ranges.T[:, :, None]
+        parameters = low + np.where(kind < 0.5, np.round(share), share) * (high - low)
+        off = self._off(draws["start"], aimed, _of(self.worst.start, sample, target, sign))
+        return Lanes(number, aimed, own, sample, target, sign, draws, parameters, off)
 
     def _drawn(self, number: Integers) -> dict[str, Array]:
         """What lanes draw, run by run."""
@@ -112,12 +108,7 @@ class Attack:
         split = np.split(np.stack(draws, axis=1), np.cumsum([*parts.values()])[:-1])
         return dict(zip(parts, split, strict=True))
 
-    def _parameters(self, share: Array, kind: Array) -> Array:
-        """Corners of the ranges, for half of them, or anywhere, (p, N)."""
-        low, high = self.setting.ranges.T[:, :, None]
-        return np.asarray(low + np.where(kind < 0.5, np.round(share), share) * (high - low))
-
-    def _start(self, draws: Array, aimed: Flags, worst: Array) -> Array:
+    def _off(self, draws: Array, aimed: Flags, worst: Array) -> Array:
         """x(0) - x*(0), (n, N)."""
         own = self.setting.loop.start
         random = worst_of(2 * draws[:-1].T - 1, own.length > 0).T
@@ -148,13 +139,13 @@ class Attack:
     def _signal(self, lanes: Lanes, name: str, table: Array, k: int, later: float = 0.0) -> Array:
         """Of adversaries the table's, of the others square waves, as shares (c, N)."""
         lag = lanes.sample - k if k < 0 else (lanes.sample - k) % (lanes.sample + 1)
-        aimed = _of(table, lag, lanes.index, lanes.sign)
+        aimed = _of(table, lag, lanes.target, lanes.sign)
         return np.where(lanes.aimed, aimed, waves(lanes.draws[name], self.setting.samples, k + later))
 
 
-def _of(table: Array, lag: Integers, index: Integers, sign: Integers) -> Array:
+def _of(table: Array, lag: Integers, target: Integers, sign: Integers) -> Array:
     """What adversaries (N,) find in a table (L, F, c), (c, N)."""
-    return np.asarray(table[np.minimum(lag, len(table) - 1), index].T * sign)
+    return np.asarray(table[np.minimum(lag, len(table) - 1), target].T * sign)
 
 
 def worst_of(table: Array, ball: bool) -> Array:

@@ -7,21 +7,22 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from math import ceil
-from typing import Final
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.progress import Phase, Progress, Step
+from tubecert.records import Json
 from tubecert.simulation.attack import Attack, Flags, Lanes
 from tubecert.simulation.families import course_of, courses
-from tubecert.simulation.record import FORMAT, Attained, Code, Outcome, Passed, Peak, Summary, Violation, Went
-from tubecert.simulation.sampled import SINGLE, Controllers, Linear, Seen, run
+from tubecert.simulation.sampled import SINGLE, Controllers, Seen, linear, run
 from tubecert.simulation.setting import Setting
 from tubecert.verdict import Verdict
 
+FORMAT: Final = "tubecert-sampled-simulation/1"
 LANES: Final = 1024  # of a chunk: the more, the cheaper is each
 _PLANS: Final = 256  # of a chunk whose lanes have plans of their own, which are kept
 _RESOLVED: Final = 0.01  # of a half-width, that a run may be wrong by
@@ -47,20 +48,15 @@ def simulate(
             if report is not None:
                 report(Step(phase=Phase.SIMULATION, done=first, of=asked))
             found.append(chunk(attack, attack.lanes(first, min(first + size, asked)), controllers))
-    return Campaign(
-        attack=attack,
-        certificate=certificate,
-        asked=asked,
-        code="c" if controllers else "floats",
-        found=tuple(found),
-    )
+    code: Literal["c", "floats"] = "c" if controllers else "floats"
+    return Campaign(attack=attack, certificate=certificate, asked=asked, controller=code, found=tuple(found))
 
 
 def chunk(attack: Attack, lanes: Lanes, controllers: Controllers | None = None) -> Seen:
     """What is seen of some lanes, in steps that are short enough if any are."""
     setting, bundle = attack.setting, attack.setting.spec.trajectory.bundle
     course = course_of(setting) if bundle is None else courses(setting, bundle, lanes.draws["plan"])
-    made = controllers or partial(Linear, setting.tables)
+    made = controllers or partial(linear, setting.tables)
     size = float(abs(setting.loop.A).sum(axis=1).max() * setting.lengths.max())
     for finer in range(_FINER):
         seen = run(attack, lanes, course, made, max(1, ceil(size / _PACE)) * 4**finer)
@@ -69,14 +65,58 @@ def chunk(attack: Attack, lanes: Lanes, controllers: Controllers | None = None) 
     return seen
 
 
+class Peak(NamedTuple):
+    """The largest |x - x*| of a state, or |u - u*| of an input, as a share of its bound: in which run, at t in s."""
+
+    share: float
+    value: float
+    bound: float
+    run: int
+    t: float
+
+
+class Violation(NamedTuple):
+    """How far a run was outside, at t for the first time: by `of`; `aimed`: what an adversary wanted, else empty."""
+
+    of: str
+    aimed: str
+    peak: Peak
+
+
+class Went(NamedTuple):
+    """Where an input was in all runs, and where it is proven to stay."""
+
+    least: float
+    greatest: float
+    proven: tuple[float, float] | None
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it left what is proven, but for the rounding of a plan."""
+        room = SINGLE * max(abs(self.least), abs(self.greatest))
+        low, high = self.proven or (self.least, self.greatest)
+        return self.least < low - room or self.greatest > high + room
+
+
+class Passed(NamedTuple):
+    """How near runs came to an obstacle (negative: into it), and whether none is proven to meet it."""
+
+    distance: float
+    run: int
+    proven: bool
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Campaign:
-    """What was run of what was `asked`: chunks of lanes in the order of their numbers, with what was seen of them."""
+    """What was run of what was `asked`: chunks of lanes in the order of their numbers, with what was seen of them.
+
+    All but `outcome` and `runs` needs one chunk at least. `controller`: the exported C code, or its tables in floats.
+    """
 
     attack: Attack
     certificate: str
     asked: int
-    code: Code
+    controller: Literal["c", "floats"]
     found: tuple[Seen, ...]
 
     @property
@@ -104,105 +144,107 @@ class Campaign:
         return np.asarray(np.max([seen.profile for seen in self.found], axis=0))
 
     @property
-    def outcome(self) -> Outcome:
+    def by_stage(self) -> Array:
+        """The same in every stage that was reached, (2, n + m, G)."""
+        starts = [int(k) for k in self.setting.stages if k < self.setting.samples]
+        return _finite(np.maximum.reduceat(self.profile, starts, axis=2))
+
+    @property
+    def outcome(self) -> Literal["falsified", "no result", "interrupted", "not falsified"]:
         """What it came to."""
-        return self.summary.outcome if self.found else "interrupted"
+        if not self.found:
+            return "interrupted"
+        entered = any(own.proven and own.distance < 0 for own in self.passed)
+        if entered or self.outside or any(own.beyond for own in self.went.values()):
+            return "falsified"
+        if self.runs < self.asked:
+            return "interrupted"
+        return "not falsified" if self.error <= _RESOLVED else "no result"
 
-    @cached_property
-    def summary(self) -> Summary:
-        """A campaign of one run at least, as its record."""
-        own, names, left = self.setting, self.setting.names, np.isfinite(self.all("left"))
-        attained = {name: _attained(self, i) for i, name in enumerate(names)}
-        went, passed = _went(self), _passed(self)
-        entered = any(each.proven and each.distance < 0 for each in passed)
-        outcome: Outcome = "not falsified" if (self.all("slack") <= _RESOLVED).all() else "no result"
-        if entered or left.any() or any(map(_beyond, went.values())):
-            outcome = "falsified"
-        elif self.runs < self.asked:
-            outcome = "interrupted"
-        return Summary(
-            format=FORMAT,
-            name=own.spec.name,
-            outcome=outcome,
-            certificate=self.certificate,
-            seed=self.attack.seed,
-            duration=own.samples * own.Ts,
-            asked=self.asked,
-            runs=self.runs,
-            adversaries=int(self.aimed.sum()),
-            controller=self.code,
-            error=_finite(self.all("slack").max()),
-            stages=tuple(float(k) * own.Ts for k in own.stages),
-            states={name: attained[name] for name in own.spec.states},
-            inputs={name: attained[name] for name in own.spec.inputs},
-            went=went,
-            obstacles=passed,
-            outside=int(left.sum()),
-            violations=tuple(_violation(self, run) for run in np.flatnonzero(left)[:_LISTED].tolist()),
-        )
+    @property
+    def error(self) -> float:
+        """The largest error of an integration, as a share of a half-width."""
+        return float(_finite(self.all("slack").max()))
 
+    @property
+    def attained(self) -> float:
+        """The largest share of any half-width."""
+        return float(self.by_stage[:, : self.setting.loop.states].max())
 
-def _went(campaign: Campaign) -> dict[str, Went]:
-    """Where every input was."""
-    proven = {use.input: (float(use.range[0]), float(use.range[1])) for use in campaign.setting.result.inputs}
-    low = np.min([seen.low for seen in campaign.found], axis=0)
-    high = np.max([seen.high for seen in campaign.found], axis=0)
-    return {
-        name: Went(least=_finite(least), greatest=_finite(greatest), proven=proven.get(name))
-        for name, least, greatest in zip(campaign.setting.spec.inputs, low, high, strict=True)
-    }
+    def peak(self, index: int, group: Flags) -> Peak | None:
+        """Of a state or an input in some lanes (N,); None if there are none."""
+        if not group.any():
+            return None
+        return self._peak(index, int(np.argmax(np.where(group, self.all("share")[index], -1.0))))
 
+    def _peak(self, index: int, number: int) -> Peak:
+        names = ("share", "value", "bound", "when")
+        share, value, bound, t = (float(_finite(self.all(name)[index, number])) for name in names)
+        return Peak(share, value, bound, number, t)
 
-def _beyond(went: Went) -> bool:
-    """Whether an input left what is proven, but for the rounding of a plan."""
-    room = SINGLE * max(abs(went.least), abs(went.greatest))
-    low, high = went.proven or (went.least, went.greatest)
-    return went.least < low - room or went.greatest > high + room
+    @property
+    def went(self) -> dict[str, Went]:
+        """Where every input was."""
+        proven = {use.input: (float(use.range[0]), float(use.range[1])) for use in self.setting.result.inputs}
+        low = _finite(np.min([seen.low for seen in self.found], axis=0)).tolist()
+        high = _finite(np.max([seen.high for seen in self.found], axis=0)).tolist()
+        ends = zip(self.setting.spec.inputs, low, high, strict=True)
+        return {name: Went(least, greatest, proven.get(name)) for name, least, greatest in ends}
 
+    @property
+    def passed(self) -> list[Passed]:
+        """How near runs came to each obstacle, in their order."""
+        proven = {own.index for own in self.setting.result.clearance if own.verdict is Verdict.CERTIFIED}
+        gaps = enumerate(_finite(self.all("near")))
+        return [Passed(float(near.min()), int(near.argmin()), i in proven) for i, near in gaps]
 
-def _passed(campaign: Campaign) -> tuple[Passed, ...]:
-    """How near any run came to each obstacle."""
-    proven = {own.index for own in campaign.setting.result.clearance if own.verdict is Verdict.CERTIFIED}
-    return tuple(
-        Passed(index=i, distance=_finite(gaps.min()), run=int(gaps.argmin()), proven=i in proven)
-        for i, gaps in enumerate(campaign.all("near"))
-    )
+    @property
+    def outside(self) -> list[int]:
+        """Runs that left the tube."""
+        return [int(number) for number in np.flatnonzero(np.isfinite(self.all("left")))]
 
+    @property
+    def violations(self) -> list[Violation]:
+        """How the first of them did."""
+        return [self._violation(number) for number in self.outside[:_LISTED]]
 
-def _attained(campaign: Campaign, index: int) -> Attained:
-    starts = [int(k) for k in campaign.setting.stages if k < campaign.setting.samples]
-    by_stage = np.maximum.reduceat(campaign.profile[:, index], starts, axis=1)
-    random, adversary = (tuple(map(_finite, own)) for own in by_stage)
-    return Attained(
-        random=_peak(campaign, index, ~campaign.aimed),
-        adversary=_peak(campaign, index, campaign.aimed),
-        random_by_stage=random,
-        adversary_by_stage=adversary,
-    )
+    def _violation(self, number: int) -> Violation:
+        names, aims, index = self.setting.names, self.attack.aims, int(self.all("what")[number])
+        aimed, left = names[aims[number, 2]] if number < len(aims) else "", float(self.all("left")[number])
+        return Violation(names[index], aimed, self._peak(index, number)._replace(t=left))
 
+    @property
+    def summary(self) -> Json:
+        """What `summary.json` holds; times in s, `stages` when they begin."""
+        own, told = self.setting, ("outcome", "certificate", "asked", "runs", "controller", "error")
+        attained = {name: self._attained(i) for i, name in enumerate(own.names)}
+        return {
+            "format": FORMAT,
+            "name": own.spec.name,
+            **{name: getattr(self, name) for name in told},
+            "seed": self.attack.seed,
+            "duration": own.samples * own.Ts,
+            "adversaries": int(self.aimed.sum()),
+            "stages": (own.stages * own.Ts).tolist(),
+            "states": {name: attained[name] for name in own.spec.states},
+            "inputs": {name: attained[name] for name in own.spec.inputs},
+            "went": {name: went._asdict() for name, went in self.went.items()},
+            "obstacles": [passed._asdict() for passed in self.passed],
+            "outside": len(self.outside),
+            "violations": [
+                {"of": of, "aimed": aimed, **peak._asdict()} for of, aimed, peak in self.violations
+            ],
+        }
 
-def _peak(campaign: Campaign, index: int, group: Flags) -> Peak | None:
-    if not group.any():
-        return None
-    run = int(np.argmax(np.where(group, campaign.all("share")[index], -1.0)))
-    share, value, bound, t = (
-        _finite(campaign.all(name)[index, run]) for name in ("share", "value", "bound", "when")
-    )
-    return Peak(share=share, value=value, bound=bound, run=run, t=t)
-
-
-def _violation(campaign: Campaign, run: int) -> Violation:
-    index, aims, names = int(campaign.all("what")[run]), campaign.attack.aims, campaign.setting.names
-    return Violation(
-        of=names[index],
-        run=run,
-        t=float(campaign.all("left")[run]),
-        value=_finite(campaign.all("value")[index, run]),
-        bound=_finite(campaign.all("bound")[index, run]),
-        aimed=names[aims[run, 2]] if run < len(aims) else "",
-    )
+    def _attained(self, index: int) -> Json:
+        found: Json = {}
+        for g, (name, group) in enumerate((("random", ~self.aimed), ("adversary", self.aimed))):
+            peak = self.peak(index, group)
+            found[name] = peak and peak._asdict()
+            found[f"{name}_by_stage"] = self.by_stage[g, index].tolist()
+        return found
 
 
-def _finite(value: float) -> float:
-    """A number that JSON has: the largest for what grew beyond all of them."""
-    return float(np.nan_to_num(value, nan=np.finfo(float).max))
+def _finite(values: Array) -> Array:
+    """Numbers that JSON has: the largest for what grew beyond all of them."""
+    return np.nan_to_num(values, nan=np.finfo(float).max)

@@ -7,9 +7,8 @@ counts as long as x* is in P. Trusted: no.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,8 +25,7 @@ _EDGE: Final = (0.5, 0.9)  # of the ellipsoid: from where to where a plan turns 
 _TINY: Final = 1e-9  # a box that is a point
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Course:
+class Course(NamedTuple):
     """x* (J + 1, n, N) at the ends of all parts, inputs as they are held (K + q + 1, m, N), interval by interval.
 
     The first interval ends when the first command acts. With one plan for all, N is 1. `ends` (N,): the first
@@ -57,20 +55,17 @@ def course_of(setting: Setting) -> Course:
     acts = float(setting.loop.rest) + np.arange(-1, K + setting.loop.whole) * Ts
     low, high = np.maximum(acts, 0.0), acts + Ts
     moving = claim.hold == "continuous" and not plan.is_constant
-    return Course(
-        x=at(np.append(np.add.outer(np.arange(K) * Ts, nodes), K * Ts))[0],
-        held=at(low + _AFTER * Ts if claim.hold == "left" else (low + high) / 2)[1],
-        ends=np.full(1, K + 1),
-        inputs=(lambda t: at(np.full(1, t))[1][0]) if moving else None,
-    )
+    x = at(np.append(np.add.outer(np.arange(K) * Ts, nodes), K * Ts))[0]
+    held = at(low + _AFTER * Ts if claim.hold == "left" else (low + high) / 2)[1]
+    return Course(x, held, np.full(1, K + 1), (lambda t: at(np.full(1, t))[1][0]) if moving else None)
 
 
 def courses(setting: Setting, bundle: Bundle, draws: Array) -> Course:
     """A random plan for every lane from its draws, `drawn(setting)` of each (.., N); N plans."""
     (n, m), K, acts, hold = setting.loop.B.shape, setting.samples, setting.acts, setting.result.claim.hold
-    steer = _Steering.of(setting, *(np.array(box, dtype=float) for box in (bundle.x, bundle.u)))
+    steer = _Steering(setting, *(np.array(box, dtype=float) for box in (bundle.x, bundle.u)))
     rate = None if bundle.input_rate is None else np.array(bundle.input_rate, dtype=float)[:, None]
-    x, u = steer.inside(draws[-n:]), steer.input_middle + np.zeros((1, draws.shape[1]))
+    x, u = steer.inside(draws[-n:]), steer.u + np.zeros((1, draws.shape[1]))
     path, held, ends = [x], [], np.full(draws.shape[1], K + 1)
     for k in range(K + setting.loop.whole + 1):
         wish = waves(draws[:-n], K, k)
@@ -83,7 +78,7 @@ def courses(setting: Setting, bundle: Bundle, draws: Array) -> Course:
             path.append(x)
         held.append(first if hold == "left" else (first + u) / 2)
         ends = np.where(steer.within(x), ends, np.minimum(ends, max(0, k - 1)))
-    return Course(x=np.stack(path[: K * len(setting.lengths) + 1]), held=np.stack(held), ends=ends)
+    return Course(np.stack(path[: K * len(setting.lengths) + 1]), np.stack(held), ends)
 
 
 def _slope(setting: Setting, ramp: tuple[Array, Array, float], missed: Array, t: float, x: Array) -> Array:
@@ -118,54 +113,43 @@ def integrated(slope: Slope, t: float, x: Array, length: float, count: int) -> A
     return x
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Steering:
-    """What keeps plans in P: inputs in Q as wished, but more and more by a `gain` (m, n) near its edge.
+    """What keeps plans in P (n, 2): inputs in Q (m, 2) as wished, but more and more a linear feedback near its edge.
 
-    Boxes are columns, middles and half sides. Near the edge is where off' `value` off, by the linear-quadratic problem
-    with the boxes as weights, nears 1, which it has where its ellipsoid leaves P.
+    Near the edge is where off' `value` off, by the linear-quadratic problem with these boxes as weights, nears 1, which
+    it has where its ellipsoid leaves P.
     """
 
-    middle: Array
-    half: Array
-    input_middle: Array
-    input_half: Array
-    gain: Array
-    value: Array
-
-    @classmethod
-    def of(cls, setting: Setting, P: Array, Q: Array) -> _Steering:
-        A, B = flow(setting.loop.A, setting.loop.B, setting.Ts)
-        size, reach = (np.maximum(np.ptp(box, axis=1) / 2, _TINY) for box in (P, Q))
-        weight, cost = np.diag(1 / size**2), np.diag(1 / reach**2)
-        value: Array = weight
-        gain: Array = np.zeros_like(B.T)
-        for _ in range(_RICCATI):
-            gain = np.asarray(np.linalg.solve(cost + B.T @ value @ B, B.T @ value @ A))
-            value = np.asarray(weight + A.T @ value @ (A - B @ gain))
-        free = size > _TINY
-        level = (size[free] ** 2 / np.diag(np.linalg.inv(value))[free]).min(initial=np.inf)
-        (middle, half), (input_middle, input_half) = (
+    def __init__(self, setting: Setting, P: Array, Q: Array) -> None:
+        (self.x, self.half), (self.u, self.reach) = (
             (box.mean(axis=1)[:, None], np.ptp(box, axis=1)[:, None] / 2) for box in (P, Q)
         )
-        boxes = {"middle": middle, "half": half, "input_middle": input_middle, "input_half": input_half}
-        return cls(**boxes, gain=gain, value=value / level)
+        A, B = flow(setting.loop.A, setting.loop.B, setting.Ts)
+        size, reach = (np.maximum(half[:, 0], _TINY) for half in (self.half, self.reach))
+        weight, cost = np.diag(1 / size**2), np.diag(1 / reach**2)
+        value: Array = weight
+        for _ in range(_RICCATI):
+            self.gain = np.linalg.solve(cost + B.T @ value @ B, B.T @ value @ A)
+            value = np.asarray(weight + A.T @ value @ (A - B @ self.gain))
+        free = size > _TINY
+        level = (size[free] ** 2 / np.diag(np.linalg.inv(value))[free]).min(initial=np.inf)
+        self.value = value / level
 
     def within(self, x: Array) -> Array:
         """Which lanes are in P, (N,)."""
-        return np.asarray((abs(x - self.middle) <= self.half).all(axis=0))
+        return np.asarray((abs(x - self.x) <= self.half).all(axis=0))
 
     def inside(self, draws: Array) -> Array:
         """Where plans start, (n, N)."""
         off = (2 * draws - 1) * self.half
-        return np.asarray(self.middle + off * np.sqrt(_EDGE[0] / np.maximum(self._out(off), _EDGE[0])))
+        return np.asarray(self.x + off * np.sqrt(_EDGE[0] / np.maximum(self._out(off), _EDGE[0])))
 
     def input(self, x: Array, wish: Array) -> Array:
         """u* (m, N) in Q for wishes (m, N) from -1 to 1 of it."""
-        off = x - self.middle
+        off = x - self.x
         near = np.clip((self._out(off) - _EDGE[0]) / (_EDGE[1] - _EDGE[0]), 0, 1)
-        pushed = (1 - near) * wish * self.input_half - near * (self.gain @ off)
-        return np.asarray(self.input_middle + np.clip(pushed, -self.input_half, self.input_half))
+        pushed = (1 - near) * wish * self.reach - near * (self.gain @ off)
+        return np.asarray(self.u + np.clip(pushed, -self.reach, self.reach))
 
     def _out(self, off: Array) -> Array:
         """How far out points (n, N) off the middle are: 1 where the ellipsoid ends."""

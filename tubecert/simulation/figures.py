@@ -29,7 +29,7 @@ def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     for name in ("tube_use", "plane"):
         if (figure := drawn(name, campaign)) is not None:
             yield from images(name, figure)
-    yield told(campaign.summary.to_json())
+    yield told(campaign.summary)
 
 
 def drawn(name: str, campaign: Campaign) -> Figure | None:

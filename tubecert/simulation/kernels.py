@@ -5,10 +5,9 @@ Implements: theory of the sampled loop, section 3, rows r_i = c AA^i, in floats.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,8 +18,7 @@ from tubecert.simulation.setting import Setting
 _LEVELS: Final = 1000  # of h that are told apart
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Kernels:
+class Kernels(NamedTuple):
     """Of F functionals, by samples before them (index 0: their own).
 
     `noise` (L, F, n); `wind` (L, F, P, k), of a unit gust in a part; `slow` (L, F, r), of signals that are held for the
@@ -31,11 +29,6 @@ class Kernels:
     wind: Array
     slow: Array
     start: Array
-
-    def of(self, chosen: Array) -> Kernels:
-        """Some of them."""
-        noise, wind, slow, start = (own[:, chosen] for own in (self.noise, self.wind, self.slow, self.start))
-        return Kernels(noise=noise, wind=wind, slow=slow, start=start)
 
 
 def kernels_of(setting: Setting, lags: int) -> Kernels:
@@ -49,7 +42,8 @@ def kernels_of(setting: Setting, lags: int) -> Kernels:
         + abs(found.start).sum(axis=0) @ loop.start.box
     )
     nodes = reach[:-m].reshape(-1, n).argmax(axis=0)
-    return found.of(np.append(nodes * n + np.arange(n), len(reach) - m + np.arange(m)))
+    chosen = np.append(nodes * n + np.arange(n), len(reach) - m + np.arange(m))
+    return Kernels(*(own[:, chosen] for own in found))
 
 
 def _everywhere(setting: Setting, lags: int) -> Kernels:
@@ -59,20 +53,16 @@ def _everywhere(setting: Setting, lags: int) -> Kernels:
     flows = [own.flow(s) for s in setting.nodes[1:]]
     AA, NN = own.step()[0].mid, own.discrete().mid[:, :n]
     rows = np.empty((lags, P * n + m, len(AA)))
-    rows[0] = np.vstack(
-        [*(f.core.mid for f in flows), np.pad(np.hstack([c.N, c.M]), [(0, 0), (0, m * (own.q + 1))])]
-    )
+    delta = np.pad(np.hstack([c.N, c.M]), [(0, 0), (0, m * (own.q + 1))])
+    rows[0] = np.vstack([*(flow.core.mid for flow in flows), delta])
     for i in range(1, lags):
         rows[i] = rows[i - 1] @ AA
     parts = np.stack([_parts(own, setting, s) for s in setting.nodes[1:]])
     now = np.concatenate([np.swapaxes(parts, 1, 2).reshape(P * n, P, n), np.zeros((m, P, n))])
     push = np.concatenate([now[None], np.einsum("lfi,pij->lfpj", rows[:-1, :, :n], parts[-1])])
-    return Kernels(
-        noise=np.concatenate([np.vstack([*(f.noise.mid for f in flows), c.N])[None], rows[:-1] @ NN]),
-        wind=push @ loop.E,
-        slow=push.sum(axis=2) @ np.hstack([loop.B, loop.E]) @ setting.spread,
-        start=rows[:, :, :n],
-    )
+    noise = np.vstack([*(flow.noise.mid for flow in flows), c.N])
+    slow = push.sum(axis=2) @ np.hstack([loop.B, loop.E]) @ setting.spread
+    return Kernels(np.concatenate([noise[None], rows[:-1] @ NN]), push @ loop.E, slow, rows[:, :, :n])
 
 
 def _parts(own: Dynamics, setting: Setting, s: Fraction) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from tubecert.simulation.attack import Attack, Flags, Lanes
 from tubecert.simulation.families import Course, integrated
 from tubecert.simulation.setting import Setting
 
-if TYPE_CHECKING:
-    from tubecert.controller.compiled import Controller as Code
-
 _ROUNDING: Final = 1e-9  # of a bound: that of floats
 _APART: Final = 16  # numbers of runs that are drawn
 _DRAWN: Final = 512  # of the first
@@ -25,41 +22,24 @@ SINGLE: Final = 2.0**-22
 """Of an input: how far that of a plan in single precision is off."""
 
 
-class Stepped(Protocol):
-    """What computes the commands of all lanes, from sample to sample."""
-
-    def step(self, y: Array, x: Array, u: Array) -> Array:
-        """Inputs (m, N) for measurements y (n, N), the plan's x* (n, N or 1) now and its u (m, N or 1) then."""
-        ...
+Step: TypeAlias = Callable[[Array, Array, Array], Array]
+"""Inputs (m, N) for measurements y (n, N), the plan's x* (n, N or 1) now and its u* (m, N or 1) when they act."""
+Controllers: TypeAlias = Callable[[int], Step]  # for so many lanes
 
 
-Controllers = Callable[[int], Stepped]  # for so many lanes
+def linear(tables: Controller, lanes: int) -> Step:
+    """The tables in floats.
 
+    Implements: theory of the sampled loop, section 1: delta = M zeta + N dy, zeta+ = F zeta + G dy.
+    """
+    zeta = np.zeros((tables.size, lanes))
 
-class Linear:
-    """The tables in floats."""
-
-    def __init__(self, tables: Controller, lanes: int) -> None:
-        self.tables, self.memory = tables, np.zeros((tables.size, lanes))
-
-    def step(self, y: Array, x: Array, u: Array) -> Array:
-        """Implements: theory of the sampled loop, section 1: delta = M zeta + N dy, zeta+ = F zeta + G dy."""
-        own, dy = self.tables, y - x
-        delta = own.M @ self.memory + own.N @ dy
-        self.memory = own.F @ self.memory + own.G @ dy
+    def step(y: Array, x: Array, u: Array) -> Array:
+        delta = tables.M @ zeta + tables.N @ (y - x)
+        zeta[...] = tables.F @ zeta + tables.G @ (y - x)
         return np.asarray(u + delta)
 
-
-class Compiled:
-    """The C code of a certificate; only of a family the plan is `handed` to it."""
-
-    def __init__(self, code: Code, *, handed: bool) -> None:
-        self.code, self.handed = code, handed
-
-    def step(self, y: Array, x: Array, u: Array) -> Array:
-        """One call for all lanes."""
-        plan = (x.T, u.T) if self.handed else ()
-        return np.asarray(self.code.step(y.T, *plan).T)
+    return step
 
 
 class Seen:
@@ -125,7 +105,7 @@ class Seen:
 class _Twin:
     """The lanes of one integration: states x (n, N), the controller, what its commands add to the plan's inputs."""
 
-    def __init__(self, setting: Setting, controller: Stepped, x: Array, count: int) -> None:
+    def __init__(self, setting: Setting, controller: Step, x: Array, count: int) -> None:
         self.controller, self.x, self.count = controller, x, count
         self.queue = [np.zeros((setting.loop.inputs, x.shape[1]))] * (
             setting.loop.whole + 2
@@ -133,7 +113,7 @@ class _Twin:
 
     def sample(self, noise: Array, plan: Array, planned: Array) -> Array:
         """The computer reads its sensors: what it adds (m, N)."""
-        delta = self.controller.step(self.x + noise, plan, planned) - planned
+        delta = self.controller(self.x + noise, plan, planned) - planned
         self.queue = [delta, *self.queue[:-1]]
         return delta
 
@@ -143,7 +123,7 @@ def run(attack: Attack, lanes: Lanes, course: Course, made: Controllers, count: 
 
     What is seen is the second; the difference, about 15 times what the fourth order leaves, is its error.
     """
-    own, seen, start = attack.setting, Seen(attack.setting, lanes, course), course.x[0] + lanes.start
+    own, seen, start = attack.setting, Seen(attack.setting, lanes, course), course.x[0] + lanes.off
     twins = [_Twin(own, made(seen.N), start, finer * count) for finer in (1, 2)]
     parts, whole, m = len(own.lengths), own.loop.whole, own.loop.inputs
     error, goal = np.zeros_like(start), attack.sent(lanes, -1)
