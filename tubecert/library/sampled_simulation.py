@@ -71,7 +71,7 @@ class SampledSimulation:
         from tubecert.simulation.figures import files
 
         with prepared(os.fspath(folder)):
-            return written_to(os.fspath(folder), files(self.campaign))
+            return written_to(os.fspath(folder), self.summary, files(self.campaign))
 
     def __str__(self) -> str:
         from tubecert.report.sampled_simulation import verdict_line

@@ -13,7 +13,6 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `layout` | the blocks of the fast part's state: the only place that counts entries |
 | `stepping` | one lane: RK4 on the slow part, with the flow of the fast part inside |
 | `fast` | (xtilde, sigma_hat, u_a): exact where linear, resolved while projecting |
-| `computer`, `held` | the controller as a computer: everything held between samples; whether that is stable |
 | `feedback`, `geodesic` | min-norm feedback, disturbance; Chebyshev geodesics by Newton |
 | `certified`, `promise` | a certificate, read back; what it promises about a loop |
 | `setting` | plan, times, starts and loops with their gains, certified or chosen |

@@ -15,18 +15,8 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.campaign import Campaign
 from tubecert.simulate.figures_plane import plane
-from tubecert.simulate.figures_style import (
-    COLORS,
-    FORMATS,
-    NAMES,
-    STYLE,
-    TUBE,
-    blank,
-    finish,
-    images,
-    labelled,
-    line,
-)
+from tubecert.simulate.figures_style import COLORS, NAMES, STYLE, TUBE, blank, finish, labelled, line
+from tubecert.simulate.output import images
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,18 +26,9 @@ if TYPE_CHECKING:
 def figures(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     """File names and contents, one figure after the other."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    import matplotlib as mpl
-
-    for name in _drawers():
-        with mpl.rc_context(STYLE):
-            figure = drawn(name, campaign)
-            if figure is not None:
-                yield from images(name, figure)
-
-
-def figure_names() -> list[str]:
-    """The files of all figures that there may be."""
-    return [f"{name}.{kind}" for name in _drawers() for kind in FORMATS]
+    for name in drawers():
+        if (figure := drawn(name, campaign)) is not None:
+            yield from images(name, figure)
 
 
 def drawn(name: str, campaign: Campaign) -> Figure | None:
@@ -55,10 +36,11 @@ def drawn(name: str, campaign: Campaign) -> Figure | None:
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):
-        return _drawers()[name](campaign)
+        return drawers()[name](campaign)
 
 
-def _drawers() -> dict[str, Callable[[Campaign], Figure | None]]:
+def drawers() -> dict[str, Callable[[Campaign], Figure | None]]:
+    """All figures that there may be, by name."""
     return {
         "states": _states,
         "plane": plane,

@@ -9,7 +9,7 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.simulate.clearance import corners_of
-from tubecert.simulate.figures_style import blank, labelled, line, title
+from tubecert.simulate.figures_style import blank, labelled, line, title, titled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from tubecert.spec import Spec
 
 _SHAPES: Final = 400  # cross-sections of the tube that are drawn
-LIGHT: Final = "#FBE3B5"
-"""Of a tube, opaque: overlapping shapes must not darken each other."""
+LIGHT: Final = "#FBE3B5"  # of a tube, opaque: overlapping shapes must not darken each other
 
 
 def plane(campaign: Campaign) -> Figure | None:
@@ -35,10 +34,11 @@ def plane(campaign: Campaign) -> Figure | None:
     figure = blank(6.4, 5.6)
     axis = figure.subplots()
     i, j = (setting.spec.states.index(name) for name in names)
-    plan = _fine_plan(setting)
+    t = np.linspace(0.0, setting.horizon, 2001)
+    plan = setting.plan.enclose(t, t)[0].mid
     section = _section(setting, i, j)
     shapes = [section + point for point in _spread(plan[:, [i, j]])]
-    axis.add_collection(PolyCollection(shapes, facecolors=LIGHT, edgecolors="none", zorder=1))
+    axis.add_collection(PolyCollection(shapes, facecolors=LIGHT, edgecolors="none", zorder=1, label="tube"))
     obstacles(axis, setting.spec, names)
     for item in campaign.drawn:
         axis.plot(item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4, **line(item))
@@ -49,12 +49,7 @@ def plane(campaign: Campaign) -> Figure | None:
     axis.set_aspect("equal")
     axis.set_xlabel(labelled(setting.spec, names[0]))
     axis.set_ylabel(labelled(setting.spec, names[1]))
-    axis.set_title(title(campaign), fontsize=9, loc="left")
-    handles, labels = axis.get_legend_handles_labels()
-    from matplotlib.patches import Patch
-
-    tube = Patch(facecolor=LIGHT)
-    figure.legend([tube, *handles], ["tube", *labels], loc="outside lower center", ncols=5)
+    titled(figure, axis, title(campaign), 5)
     return figure
 
 
@@ -65,13 +60,6 @@ def names_of(spec: Spec) -> tuple[str, str] | None:
     if spec.obstacles:
         return spec.obstacles[0].states
     return (spec.states[0], spec.states[1]) if len(spec.states) > 1 else None
-
-
-def _fine_plan(setting: Setting) -> Array:
-    """The plan's states (K, n) for drawing."""
-    t = np.linspace(0.0, setting.horizon, 2001)
-    x, _ = setting.plan.enclose(t, t)
-    return x.mid
 
 
 def _spread(curve: Array) -> Array:

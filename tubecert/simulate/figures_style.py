@@ -5,8 +5,6 @@ Colours are those of Okabe and Ito, told apart by everybody; what is certified i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from io import BytesIO
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from tubecert.digits import near
@@ -45,16 +43,6 @@ STYLE: Final[Any] = {
     "legend.fontsize": 8,
     "savefig.dpi": 150,
 }
-FORMATS: Final = ("png", "svg")
-
-
-def images(name: str, figure: Figure) -> Iterator[tuple[str, bytes]]:
-    """The files of a figure: the same bytes for the same data."""
-    for kind in FORMATS:
-        buffer = BytesIO()
-        metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
-        figure.savefig(buffer, format=kind, metadata=metadata)
-        yield f"{name}.{kind}", buffer.getvalue()
 
 
 def blank(width: float, height: float) -> Figure:

@@ -9,23 +9,28 @@ import json
 import math
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TargetError
 from tubecert.files import replace
 from tubecert.findings import Finding
 from tubecert.records import Json
+from tubecert.simulate.figures_style import STYLE
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tubecert.simulate.campaign import Attack, Campaign, Drawn
     from tubecert.simulate.runs import Runs
 
 SUMMARY: Final = "summary.json"
+
+FORMATS: Final = ("png", "svg")
 
 
 @contextlib.contextmanager
@@ -51,20 +56,26 @@ def prepared(folder: str) -> Iterator[None]:
 
 
 def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
-    """Writes every file of a campaign; returns their names. Raises `TargetError`."""
-    return written_to(folder, _files(campaign, certificate), _outdated(campaign))
+    """Writes every file of a campaign; returns their names. Raises `TargetError`.
 
-
-def written_to(folder: str, files: Iterable[tuple[str, bytes]], outdated: Sequence[str] = ()) -> list[str]:
-    """Writes files, the summary last, so that a folder with a summary is complete; returns their names.
-
-    Raises `TargetError`.
+    Earlier figures that are not replaced do not stay: to draw takes seconds, which an interruption does not leave.
     """
-    written = []
+    from tubecert.simulate.figures import drawers
+    from tubecert.simulate.summary import summary
+
+    names = [f"{name}.{kind}" for name in drawers() for kind in FORMATS]
+    return written_to(folder, summary(campaign, certificate).to_json(), _files(campaign), names)
+
+
+def written_to(
+    folder: str, summary: Json, files: Iterable[tuple[str, bytes]], outdated: Sequence[str] = ()
+) -> list[str]:
+    """Writes files, then the summary: a folder that has it is complete. Their names; raises `TargetError`."""
+    written, text = [], json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n"
     try:
         for name in (SUMMARY, *outdated):  # of earlier files, which are now replaced
             (Path(folder) / name).unlink(missing_ok=True)
-        for name, data in files:
+        for name, data in chain(files, [(SUMMARY, text.encode())]):
             replace(Path(folder) / name, data)
             written.append(name)
     except OSError as error:
@@ -72,16 +83,8 @@ def written_to(folder: str, files: Iterable[tuple[str, bytes]], outdated: Sequen
     return written
 
 
-def _outdated(campaign: Campaign) -> list[str]:
-    """Earlier figures that are not replaced: to draw takes seconds, which an interruption does not leave."""
-    from tubecert.simulate.figures import figure_names
-
-    return figure_names() if campaign.interrupted else []
-
-
-def _files(campaign: Campaign, certificate: str) -> Iterator[tuple[str, bytes]]:
+def _files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     from tubecert.simulate.figures import figures
-    from tubecert.simulate.summary import summary
 
     yield "runs.npz", npz(_arrays(campaign))
     for item in campaign.drawn:
@@ -91,12 +94,18 @@ def _files(campaign: Campaign, certificate: str) -> Iterator[tuple[str, bytes]]:
             yield f"monte_carlo_{attack.loop.controller}.csv", _table(*_sample_table(campaign, attack))
     if not campaign.interrupted:
         yield from figures(campaign)
-    yield told(summary(campaign, certificate).to_json())
 
 
-def told(summary: Json) -> tuple[str, bytes]:
-    """The file of a summary."""
-    return SUMMARY, (json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n").encode()
+def images(name: str, figure: Figure) -> Iterator[tuple[str, bytes]]:
+    """The files of a figure."""
+    import matplotlib as mpl
+
+    for kind in FORMATS:
+        buffer = io.BytesIO()
+        metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+        with mpl.rc_context(STYLE):
+            figure.savefig(buffer, format=kind, metadata=metadata)
+        yield f"{name}.{kind}", buffer.getvalue()
 
 
 def _arrays(campaign: Campaign) -> dict[str, Array]:
@@ -128,10 +137,10 @@ def _named(prefix: str, runs: Runs) -> dict[str, Array]:
     }
 
 
-def npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+def npz(arrays: Mapping[str, Any]) -> bytes:
     """Arrays as the bytes of a file of numpy."""
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
+    np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
 
 

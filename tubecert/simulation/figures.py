@@ -10,8 +10,8 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.figures_plane import LIGHT, names_of, obstacles
-from tubecert.simulate.figures_style import COLORS, STYLE, TUBE, blank, images, labelled, titled
-from tubecert.simulate.output import npz, told
+from tubecert.simulate.figures_style import COLORS, STYLE, TUBE, blank, labelled, titled
+from tubecert.simulate.output import images, npz
 from tubecert.simulation.campaign import Campaign
 
 if TYPE_CHECKING:
@@ -23,13 +23,12 @@ _KEPT: Final = ("share", "when", "value", "bound", "left", "slack")
 
 
 def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
-    """Of a campaign of one run at least, the summary last; the same campaign gives the same bytes."""
+    """Of a campaign of one run at least, beside its summary; the same campaign gives the same bytes."""
     arrays = {name: campaign.all(name) for name in _KEPT} | {"names": np.array(campaign.setting.names)}
     yield "runs.npz", npz({**arrays, "profile": campaign.profile, "aimed": campaign.aimed})
     for name in ("tube_use", "plane"):
         if (figure := drawn(name, campaign)) is not None:
             yield from images(name, figure)
-    yield told(campaign.summary)
 
 
 def drawn(name: str, campaign: Campaign) -> Figure | None:
