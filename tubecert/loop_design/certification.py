@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from fractions import Fraction
@@ -155,6 +155,8 @@ def _answer(question: Question, settings: Mapping[str, str], report: Progress | 
     loop = question.loop
     plain = _result(loop, settings)
     notes = Notes()
+    if hopeless := list(_hopeless(question)):
+        return replace(plain, lacks=tuple(hopeless)), notes
     narrow = np.ones(loop.inputs)
     for _ in range(_TRIES):
         try:
@@ -190,6 +192,23 @@ def _answer(question: Question, settings: Mapping[str, str], report: Progress | 
             for name in loop.model.inputs
         ]
     return result, notes
+
+
+def _hopeless(question: Question) -> Iterator[Lack]:
+    """What no controller could mend: a start outside of all that is allowed, a plan beyond the limits."""
+    loop, own = question.loop, question.remainders
+    wishes = dict(loop.spec.tube.half_widths)
+    states = zip(loop.model.states, loop.start.reach, _space(loop, own), strict=True)
+    for name, reach, space in states:
+        most = min(space, float(wishes.get(name, np.inf)))
+        if reach >= most:
+            yield Lack(kind="start", where=name, needed=float(reach), allowed=float(most))
+    limits = dict(loop.spec.limits)
+    for name, low, high in zip(loop.model.inputs, *own.inputs_range, strict=True):
+        least, most = map(float, limits.get(name, (-np.inf, np.inf)))
+        if low < least or high > most:
+            end, limit = (low, least) if low < least else (high, most)
+            yield Lack(kind="plan", where=name, needed=float(end), allowed=limit)
 
 
 def _half(loop: Loop) -> Array:

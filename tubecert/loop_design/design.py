@@ -57,7 +57,10 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
     is, or has no tube.
     """
     unfound.refuse_inputs(plant, np.full_like(plant.room, 1e-300))
-    units = units_of(plant)
+    with np.errstate(all="ignore"):
+        units = units_of(plant)
+    if not np.isfinite(np.concatenate(units)).all():  # too much happens within a sample
+        raise NoDesign("no_design")
     observer = observe(in_units(plant, units))
     unfound.refuse_unmoved(observer.plant)
     unfound.refuse_unheld(plant)

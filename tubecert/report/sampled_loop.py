@@ -95,13 +95,15 @@ def _first(result: Result) -> Sequence[str]:
 def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) -> Table:
     """Half-widths at the start, in the long run, as wished; `notes` say what fills them, inputs as well."""
     system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
-    stages = result.tube[:1] + result.tube[1:][-1:]
+    stages = result.tube, result.tube[1:][-1:]  # what is never left, and what holds in the long run
     filled = notes.filled if notes else {}
-    when = (f"from {up(stage.start * period(result))} s" for stage in stages)
+    when = (f"from {up(own[0].start * period(result))} s" for own in stages if own)
     title = "tube" if result.verdict is Verdict.CERTIFIED else "not proven"
     grid = [[title, *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
     for name in (*names, *(system.inputs if notes else ())):
-        widths = [up(stage.half_widths.get(name, stage.deviations.get(name))) for stage in stages]
+        widths = [
+            up(max({**own.half_widths, **own.deviations}[name] for own in each)) for each in stages if each
+        ]
         row = [f"{name} ({system.units[name]})" if system.units.get(name) else name, *widths]
         row += [exact(wishes[name]) if name in wishes else ""] if wishes else []
         row += [filling(filled[name]) if name in filled else ""] if filled else []

@@ -173,6 +173,7 @@ Missing = Literal[
     "inputs",
     "safe_set",
     "start",
+    "plan",
     "obstacle",
     "undefined",
     "wish",
