@@ -8,7 +8,6 @@ import pytest
 from commands import run
 
 import tubecert as tc
-from tubecert.certificate.file import FORMAT, digest, dump
 from tubecert.controller import folder as writing
 from tubecert.controller.data import data_of
 from tubecert.controller.folder import files_of, write
@@ -171,8 +170,7 @@ def test_what_has_no_code_is_refused_with_a_remedy(tmp_path, monkeypatch, option
 
 @pytest.mark.slow
 def test_a_certificate_of_a_continuous_loop_is_refused(tmp_path):
-    path = tmp_path / "small.json"
-    path.write_text(dump({"format": FORMAT, "hash": digest({}), "result": {}}))
+    other = tc.Certification(certificate=None, text="")
     with pytest.raises(TubecertError, match="continuous time") as caught:
-        tc.export(path, tmp_path / "c")
+        tc.export(other, tmp_path / "c")
     assert "hardware" in caught.value.findings[0].help

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from tubecert.certificate import file
 from tubecert.controller.data import data_of
 from tubecert.controller.folder import files_of, write
 from tubecert.controller.plans import refused
+from tubecert.library.reading import read
+from tubecert.library.sampled import SampledCertification
 from tubecert.library.specification import File
-from tubecert.sampled_loop.file import of_json
-from tubecert.sampled_loop.record import FORMAT, Certificate
-
-if TYPE_CHECKING:
-    from tubecert.library.stated import Stated
+from tubecert.library.stated import Stated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,27 +29,16 @@ def export(result: Stated | File, folder: File) -> Exported:
     Raises `TubecertError` for a certificate that says less than `certified` or has no controller (TC710), and
     `TargetError` where a file of the folder is none that tubecert wrote, or was changed.
     """
-    certificate = _certificate(result)
+    found = result if isinstance(result, Stated) else read(result)
+    if not isinstance(found, SampledCertification):
+        help = "give the specification a section hardware (rate, delay, noise), and certify again"
+        raise refused("it is about a loop in continuous time, which no computer runs", help)
+    certificate = found.certificate
     plan = certificate.result.spec.effective.part("trajectory")
     if certificate.result.claim.hold == "continuous" and plan.get("kind") != "equilibrium":
-        help = "certify with hardware: {hold: middle}, which is how a computer holds it"
-        raise refused(
-            "it is proven for an input of the plan that changes within a sample, and code holds it", help
-        )
+        message = "it is proven for an input of the plan that changes within a sample, and code holds it"
+        raise refused(message, "certify with hardware: {hold: middle}, which is how a computer holds it")
     data = data_of(certificate)
     target, files = os.fspath(folder), files_of(data)
     write(target, files)
     return Exported(folder=target, files=tuple(sorted(files)), work=data.work)
-
-
-def _certificate(result: Stated | File) -> Certificate:
-    """The record of a sampled loop; raises TC710 for the certificate of a loop in continuous time."""
-    found = getattr(result, "certificate", None)
-    if isinstance(result, (str, os.PathLike)):
-        name = os.fspath(result)
-        sealed = file.load(name, (FORMAT, file.FORMAT))
-        found = of_json(sealed, name) if sealed["format"] == FORMAT else None
-    if not isinstance(found, Certificate):
-        help = "give the specification a section hardware (rate, delay, noise), and certify again"
-        raise refused("it is about a loop in continuous time, which no computer runs", help)
-    return found

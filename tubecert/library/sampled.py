@@ -66,15 +66,11 @@ class SampledCertification(Stated):
         from tubecert.report.page import Reason
         from tubecert.words.sampled_loop import remedy, why
 
-        notes = self.certificate.notes
+        lacks, notes = self.result.lacks, self.certificate.notes
+        told = ((lack.kind, why(lack, self.units), remedy(lack, notes)) for lack in lacks)
         return tuple(
-            Reason(
-                verdict=self.verdict,
-                claim=lack.kind,
-                message=why(lack, self.units),
-                relax=remedy(lack, notes),
-            )
-            for lack in self.result.lacks
+            Reason(verdict=self.verdict, claim=kind, message=message, relax=help)
+            for kind, message, help in told
         )
 
     @property
@@ -117,14 +113,10 @@ class SampledCertification(Stated):
         """The tube over time; None for a family of plans, and if nothing is proven."""
         from tubecert.report.figures_sampled import band
 
-        if not self.certified:
-            return None
         t, x, widths = band(self.certificate)
-        return (
-            Tube(t=array(t), lower=array(x - widths), upper=array(x + widths), plan=array(x))
-            if t.size
-            else None
-        )
+        if not self.certified or not t.size:
+            return None
+        return Tube(t=array(t), lower=array(x - widths), upper=array(x + widths), plan=array(x))
 
     def controller(self) -> SampledController:
         """The proven controller, from its first sample on; a new one for every run.
@@ -155,9 +147,9 @@ class SampledController:
     """
 
     def __init__(self, data: Data) -> None:
-        self.sample_time = float(data.sample_time)
-        self.samples = 0
-        self._data, self._row, self._zeta = data, 0, np.zeros(data.sizes[2])
+        self.sample_time, self.samples = float(data.sample_time), 0
+        self._plan, self._tables, self._row = data.plan, data.tables, 0
+        self._zeta = np.zeros(data.sizes[2])
 
     def __call__(
         self, t: float, y: ArrayLike, x: ArrayLike | None = None, u: ArrayLike | None = None
@@ -167,21 +159,20 @@ class SampledController:
         Of a family the plan comes with every sample: x* at t (n,), and u* (m,) as it is held while the input acts.
         Raises `ValueError` if t is not the time of the next sample, if a plan is missing, or is over.
         """
-        at, plan = self._data.plan.at, self._data.plan
+        plan, tables = self._plan, self._tables
         if abs(t / self.sample_time - self.samples) > _ON_TIME * (1 + self.samples):
             raise ValueError(f"the next sample is at t = {self.samples * self.sample_time} s")
-        if (at is None) is (x is None or u is None):
+        if (plan.at is None) is (x is None or u is None):
             raise ValueError("x and u are given for a family of plans, and only there")
         if self._row >= plan.steps:
             raise ValueError("the plan is over, and nothing is proven for later")
-        given = at([self._row]) if at is not None else (np.asarray(x, float), np.asarray(u, float))
-        own_x, own_u = map(np.ravel, given)
-        tables, off = self._data.tables, np.asarray(y, float) - own_x
-        command = own_u + tables["M"] @ self._zeta + tables["N"] @ off
+        given = (x, u) if plan.at is None else plan.at([self._row])
+        planned, held = (np.ravel(np.asarray(each, float)) for each in given)
+        off = np.asarray(y, float) - planned
+        command = held + tables["M"] @ self._zeta + tables["N"] @ off
         self._zeta = tables["F"] @ self._zeta + tables["G"] @ off
-        self.samples, self._row = self.samples + 1, self._row + 1
-        if self._row >= plan.steps:
-            self._row = plan.after
+        self.samples += 1
+        self._row = self._row + 1 if self._row + 1 < plan.steps else plan.after
         return np.asarray(command)
 
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tubecert.digits import short
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
-from tubecert.library.sampled import SampledCertification, compared
+from tubecert.library.sampled import SampledCertification
 from tubecert.library.specification import File
-from tubecert.progress import Progress
 from tubecert.records import Json
 from tubecert.sampled_loop.record import Certificate
-from tubecert.spec import Spec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,30 +89,7 @@ class SampledSimulation:
         return notebook.of_line(str(self), own.spec.name, style, rows)
 
 
-def simulated(
-    found: SampledCertification,
-    spec: Spec,
-    *,
-    runs: int,
-    seed: int,
-    duration: Fraction | None,
-    report: Progress | None,
-) -> SampledSimulation:
-    """The campaign of a certificate; raises `TubecertError` if there is no tube, or it is of another specification."""
-    from tubecert.certificate.belonging import as_set
-    from tubecert.simulation.campaign import simulate
-    from tubecert.simulation.setting import setting_of
-
-    _require_tube(found)
-    compared(spec, found.result).require(spec, "the certificate")
-    setting = setting_of(as_set(spec, found.result.spec.settings), found.result, duration)
-    made = _compiled(found.certificate)
-    return SampledSimulation(
-        campaign=simulate(setting, found.hash, made, runs=runs, seed=seed, report=report)
-    )
-
-
-def _require_tube(found: SampledCertification) -> None:
+def require_tube(found: SampledCertification) -> None:
     """Raises TC703 where nothing is proven."""
     result = found.result
     if result.tube and result.controller is not None and result.nominal is not None:
@@ -127,7 +101,7 @@ def _require_tube(found: SampledCertification) -> None:
     raise error
 
 
-def _compiled(certificate: Certificate) -> Controllers | None:
+def compiled(certificate: Certificate) -> Controllers | None:
     """The exported C code as the controller; None where there is none to export, or no compiler."""
     from tubecert.controller.compiled import Controller
     from tubecert.controller.data import data_of

@@ -15,13 +15,14 @@ from tubecert.executor import Executor, Serial
 from tubecert.expression import suggestion
 from tubecert.findings import Finding, Severity
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
+from tubecert.library import sampled_simulation
 from tubecert.library.asked import Named, one_of, require_nothing_of_a_metric
 from tubecert.library.certification import Certification
 from tubecert.library.numbers import Numbers
 from tubecert.library.plain import Number, number_texts
 from tubecert.library.reading import read
-from tubecert.library.sampled import SampledCertification
-from tubecert.library.sampled_simulation import SampledSimulation, simulated
+from tubecert.library.sampled import SampledCertification, compared
+from tubecert.library.sampled_simulation import SampledSimulation
 from tubecert.library.simulation import Simulation
 from tubecert.library.specification import File, Specifiable, spec_of
 from tubecert.library.stated import Stated
@@ -102,16 +103,23 @@ def sampled_of(
     found: SampledCertification, system: Spec, numbers: SimulationNumbers, report: Progress | None
 ) -> SampledSimulation:
     """The same of a sampled loop."""
+    from tubecert.certificate.belonging import as_set
+    from tubecert.simulation.campaign import simulate as campaign
+    from tubecert.simulation.setting import setting_of
+
     require_extra(("matplotlib",))
-    default = system.simulation or Section()
-    return simulated(
-        found,
-        system,
+    sampled_simulation.require_tube(found)
+    compared(system, found.result).require(system, "the certificate")
+    default, system = system.simulation or Section(), as_set(system, found.result.spec.settings)
+    own = campaign(
+        setting_of(system, found.result, numbers.duration),
+        found.hash,
+        sampled_simulation.compiled(found.certificate),
         runs=_first(numbers.runs, default.runs, RUNS),
         seed=_first(numbers.seed, default.seed, SEED),
-        duration=numbers.duration,
         report=report,
     )
+    return SampledSimulation(campaign=own)
 
 
 def specification_of(found: Certification | SampledCertification) -> Spec:

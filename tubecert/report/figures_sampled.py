@@ -6,10 +6,10 @@ In: a certificate. Out: figures in floats; nothing is decided here. A family of 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from tubecert.words.sampled_loop import SHARES, percents
 _FOR_EVER: Final = 1.0  # s that are drawn of a plan without an end, beyond the start of the last stage
 _LEFT, _ROW = 90, 30  # of the bars
 _STYLES: Final = dict(zip(SHARES.values(), ("n1", "n4", "n2", "n3", "n5", "n6"), strict=True))
-Band = tuple[Array, Array, Array]
+Ends: TypeAlias = Sequence[Fraction | str]
 
 
 def period(result: Result) -> Fraction:
@@ -32,22 +32,19 @@ def period(result: Result) -> Fraction:
     return Fraction(result.spec.effective.part("hardware")["sample_time"])
 
 
-def band(certificate: Certificate) -> Band:
+def band(certificate: Certificate) -> tuple[Array, Array, Array]:
     """Times (K,) in s, the plan there (K, n), half-widths (K, n); where a later stage begins, a time occurs twice.
 
     The plan is interpolated between the points that the notes have. Empty for a family, and without a tube.
     """
     result, notes = certificate.result, certificate.notes
     states = result.spec.effective.system.states
+    nothing, horizon = np.zeros((0, len(states))), result.claim.horizon
     if not (result.tube and notes.samples_t):
-        return np.zeros(0), np.zeros((0, len(states))), np.zeros((0, len(states)))
+        return np.zeros(0), nothing, nothing
     starts = [float(stage.start * period(result)) for stage in result.tube]
     known = np.array(notes.samples_t)
-    last = (
-        max(known[-1], starts[-1] + _FOR_EVER)
-        if result.claim.horizon is None
-        else float(result.claim.horizon)
-    )
+    last = max(known[-1], starts[-1] + _FOR_EVER) if horizon is None else float(horizon)
     times = [
         np.array([begin, *known[(known > begin) & (known < until)], until])
         for begin, until in pairwise([*starts, max(last, starts[-1])])
@@ -62,49 +59,47 @@ def figures(certificate: Certificate) -> Iterator[Figure]:
     """All of them, as far as there is something to draw."""
     result, (t, x, widths) = certificate.result, band(certificate)
     if t.size:
-        proven = result.verdict is Verdict.CERTIFIED
-        style, told = ("tube", "proven in the loop") if proven else ("unproven", "not proven")
-        drawings = (*_states(certificate, t, x, widths, told), *_inputs(certificate, t, told))
-        yield from (each.figure(style) for each in drawings)
+        style = "tube" if result.verdict is Verdict.CERTIFIED else "unproven"
+        yield from (each.figure(style) for each in _over_time(certificate, t, x, widths))
         yield from _planes(result, x, widths)
     if certificate.notes.filled:
         yield _bars(certificate.notes.filled)
 
 
-def _states(certificate: Certificate, t: Array, x: Array, widths: Array, told: str) -> Iterator[Drawing]:
-    effective = certificate.result.spec.effective
-    for i, name in enumerate(effective.system.states):
-        yield Drawing(
-            key=f"state-{i}",
+def _over_time(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Drawing]:
+    result, notes = certificate.result, certificate.notes
+    system, safe = result.spec.effective.system, result.spec.effective.part("safe_set")
+    told = "proven in the loop" if result.verdict is Verdict.CERTIFIED else "not proven"
+
+    def drawing(key: str, name: str, curve: Array, ends: Sequence[Array], limits: Ends | None) -> Drawing:
+        return Drawing(
+            key=key,
             name=name,
-            unit=effective.system.units.get(name, ""),
-            curve=_points(t, x[:, i]),
-            band=(_points(t, x[:, i] - widths[:, i]), _points(t, x[:, i] + widths[:, i])),
-            limits=_ends(effective.part("safe_set")[name]),
-            words=("safe set", told, "plan"),
+            unit=system.units.get(name, ""),
+            curve=_points(t, curve),
+            band=(_points(t, ends[0]), _points(t, ends[1])),
+            limits=None if limits is None else _ends(limits),
+            words=("limits" if name in system.inputs else "safe set", told, "plan"),
         )
 
-
-def _inputs(certificate: Certificate, t: Array, told: str) -> Iterator[Drawing]:
-    system, notes = certificate.result.spec.effective.system, certificate.notes
-    for use in certificate.result.inputs:
+    for i, name in enumerate(system.states):
+        ends = (x[:, i] - widths[:, i], x[:, i] + widths[:, i])
+        yield drawing(f"state-{i}", name, x[:, i], ends, safe[name])
+    for use in result.inputs:
         i = system.inputs.index(use.input)
-        low, high = (_points(t, np.full(t.shape, float(end))) for end in use.range)
-        yield Drawing(
-            key=f"input-{i}",
-            name=use.input,
-            unit=system.units.get(use.input, ""),
-            curve=_points(t, np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])),
-            band=(low, high),
-            limits=None if use.limits is None else _ends(use.limits),
-            words=("limits", told, "plan"),
-        )
+        curve = np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])
+        ends = (np.full(t.shape, float(use.range[0])), np.full(t.shape, float(use.range[1])))
+        yield drawing(f"input-{i}", use.input, curve, ends, use.limits)
 
 
 def _planes(result: Result, x: Array, widths: Array) -> Iterator[Figure]:
     """The planes in which there are obstacles, with the widest tube."""
     effective = result.spec.effective
-    states, units = effective.system.states, effective.system.units
+    states, units, proven = (
+        effective.system.states,
+        effective.system.units,
+        result.verdict is Verdict.CERTIFIED,
+    )
     for names in dict.fromkeys(obstacle.states for obstacle in effective.obstacles):
         i, j = map(states.index, names)
         a, b = map(float, widths[:, [i, j]].max(axis=0))
@@ -117,12 +112,12 @@ def _planes(result: Result, x: Array, widths: Array) -> Iterator[Figure]:
             tube=Outline(turn=((2 * a, 0.0), (0.0, 2 * b)), sides=(a, b)),
             safe=((left, low), (right, high)),
         )
-        chart, legend = scene(f"plane-{i}-{j}", plane, [], result.verdict is Verdict.CERTIFIED)
+        chart, legend = scene(f"plane-{i}-{j}", plane, [], proven)
         for obstacle in effective.obstacles:
             if set(obstacle.states) == set(names):
                 draw_obstacle(chart, obstacle, names)
-        shown = (*legend, ("obstacle", "obstacle"))
-        yield Figure(key=chart.key, title=", ".join(names), svg=chart.text(), legend=shown)
+        legend.append(("obstacle", "obstacle"))
+        yield Figure(key=chart.key, title=", ".join(names), svg=chart.text(), legend=tuple(legend))
 
 
 def _bars(filled: Mapping[str, Shares]) -> Figure:
@@ -134,9 +129,8 @@ def _bars(filled: Mapping[str, Shares]) -> Figure:
         text(svg, (_LEFT - 8, y + 4), name, "axis end")
         for what, part in percents(shares).items():
             end = x + part / 100 * (WIDTH - _LEFT - 10)
-            bar = ET.SubElement(
-                svg, "path", {"class": f"curve bar {_STYLES[what]}", "d": path([(x, y), (end, y)])}
-            )
+            look = {"class": f"curve bar {_STYLES[what]}", "d": path([(x, y), (end, y)])}
+            bar = ET.SubElement(svg, "path", look)
             ET.SubElement(bar, "title").text = f"{what} {part} %"
             used[what], x = None, end
     legend = tuple((_STYLES[what], what) for what in SHARES.values() if what in used)
@@ -147,5 +141,5 @@ def _points(x: Array, y: Array) -> list[Point]:
     return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def _ends(ends: tuple[Fraction | str, ...]) -> Point:
+def _ends(ends: Ends) -> Point:
     return float(Fraction(ends[0])), float(Fraction(ends[1]))

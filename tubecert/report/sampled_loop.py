@@ -5,7 +5,7 @@ In: a certificate. Out: a `Page`, which terminals, HTML, Markdown and notebooks 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import Final
 
@@ -25,30 +25,30 @@ _TILES: Final = 4
 def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Page:
     """The page of a certificate, whatever its verdict."""
     result, notes = certificate.result, certificate.notes
-    units, drawn = result.spec.effective.system.units, tuple(figures(certificate))
-    table = [] if not result.tube else [_widths(result, result.spec.effective.system.states, notes)]
-    sections: dict[str, tuple[str, Sequence[Block]]] = {
-        "loop": ("The loop", [*_screen(result, notes)]),
-        "figures": ("Figures", [Figures(figures=drawn)] if drawn else []),
-        "tube": ("Half-widths, and what fills them", table),
-        "simulation": ("Simulation", [] if simulated is None else [*simulated_blocks(simulated)]),
-        "assumed": ("Assumed, not proven", [Items(items=tuple(assumed(result)))]),
-        "origin": ("Where it comes from", [_origin(certificate)]),
-    }
+    system, drawn = result.spec.effective.system, tuple(figures(certificate))
+    sections: Sequence[tuple[str, str, Iterable[Block]]] = (
+        ("loop", "The loop", _screen(result, notes)),
+        ("figures", "Figures", [Figures(figures=drawn)] if drawn else []),
+        (
+            "tube",
+            "Half-widths, and what fills them",
+            [_widths(result, system.states, notes)] if result.tube else [],
+        ),
+        ("simulation", "Simulation", [] if simulated is None else simulated_blocks(simulated)),
+        ("assumed", "Assumed, not proven", [Items(items=tuple(assumed(result)))]),
+        ("origin", "Where it comes from", [_origin(certificate)]),
+    )
+    found = (Section(key=key, title=title, blocks=tuple(blocks)) for key, title, blocks in sections)
     return Page(
         name=result.spec.effective.name,
         verdict=result.verdict,
         summary=promise(result),
         meaning=f"{_meaning(result)} {NOT_RECHECKED}",
         tiles=tuple(
-            Tile(symbol=name, value=f"±{up(width)}", unit=units.get(name, ""), words="half-width")
+            Tile(symbol=name, value=f"±{up(width)}", unit=system.units.get(name, ""), words="half-width")
             for name, width in [*result.half_widths.items()][:_TILES]
         ),
-        sections=tuple(
-            Section(key=key, title=title, blocks=tuple(blocks))
-            for key, (title, blocks) in sections.items()
-            if blocks
-        ),
+        sections=tuple(section for section in found if section.blocks),
     )
 
 
@@ -69,10 +69,9 @@ def _start(result: Result) -> str:
 
 def _screen(result: Result, notes: Notes) -> Iterator[Block]:
     """What is seen first."""
-    plans = (
-        [("plans", family(result.spec.effective))] if result.spec.effective.trajectory.kind == "any" else []
-    )
-    yield _facts([("loop", loop(result.spec.effective)), *plans, ("start", _start(result))])
+    effective = result.spec.effective
+    plans = [("plans", family(effective))] if effective.trajectory.kind == "any" else []
+    yield _facts([("loop", loop(effective)), *plans, ("start", _start(result))])
     if result.tube:
         yield _widths(result, _first(result))
     proven = result.verdict is Verdict.CERTIFIED
@@ -95,37 +94,36 @@ def _first(result: Result) -> Sequence[str]:
 def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) -> Table:
     """Half-widths at the start, in the long run, as wished; `notes` say what fills them, inputs as well."""
     system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
-    stages = result.tube, result.tube[1:][-1:]  # what is never left, and what holds in the long run
-    filled = notes.filled if notes else {}
-    when = (f"from {up(own[0].start * period(result))} s" for own in stages if own)
-    title = "tube" if result.verdict is Verdict.CERTIFIED else "not proven"
-    grid = [[title, *when, *(["wish"] if wishes else []), *(["filled by"] if filled else [])]]
-    for name in (*names, *(system.inputs if notes else ())):
-        widths = [
-            up(max({**own.half_widths, **own.deviations}[name] for own in each)) for each in stages if each
-        ]
-        row = [f"{name} ({system.units[name]})" if system.units.get(name) else name, *widths]
-        row += [exact(wishes[name]) if name in wishes else ""] if wishes else []
-        row += [filling(filled[name]) if name in filled else ""] if filled else []
-        grid.append(row)
-    if len(names) > _ROWS and not notes:
-        grid = [[*column] for column in zip(*grid, strict=True)]
-    rows = [
-        tuple(Cell(text=told, kind="number" if i else "text") for i, told in enumerate(row))
-        for row in grid[1:]
-    ]
+    named = (*names, *(system.inputs if notes else ()))
+    columns = [["tube" if result.verdict is Verdict.CERTIFIED else "not proven"]]
+    columns[0] += [f"{name} ({system.units[name]})" if system.units.get(name) else name for name in named]
+    for stages in filter(None, (result.tube, result.tube[1:][-1:])):  # what is never left, and the long run
+        bounds = [{**stage.half_widths, **stage.deviations} for stage in stages]
+        widths = (up(max(own[name] for own in bounds)) for name in named)
+        columns.append([f"from {up(stages[0].start * period(result))} s", *widths])
+    if wishes:
+        columns.append(["wish", *(exact(wishes[name]) if name in wishes else "" for name in named)])
+    if filled := notes.filled if notes else {}:
+        columns.append(["filled by", *(filling(filled[name]) if name in filled else "" for name in named)])
+    aside = len(names) > _ROWS and not notes
+    head, *rows = columns if aside else zip(*columns, strict=True)
     left = len(system.states) - len(names)
-    return Table(columns=tuple(grid[0]), rows=tuple(rows), note=f"{left} more with -v" if left else "")
+    return Table(
+        columns=tuple(head),
+        rows=tuple(
+            (Cell(text=row[0]), *(Cell(text=told, kind="number") for told in row[1:])) for row in rows
+        ),
+        note=f"{left} more with -v" if left else "",
+    )
 
 
 def _inputs(result: Result) -> Iterator[tuple[str, str]]:
     units = result.spec.effective.system.units
     for use in result.inputs:
         told = f"{down(use.range[0])} to {up(use.range[1])} {units.get(use.input, '')}".rstrip()
-        if use.limits is not None and (share := use.share) is not None:
-            told += (
-                f" of {exact(use.limits[0])} to {exact(use.limits[1])}: {up(100 * share, 3)} % of the room"
-            )
+        if use.limits is not None and use.share is not None:
+            limits, used = " to ".join(map(exact, use.limits)), up(100 * use.share, 3)
+            told += f" of {limits}: {used} % of the room"
         yield use.input, told
 
 
@@ -139,7 +137,7 @@ def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
         if name in notes.long_run and name in (wished or safe)
     }
     if sizes:
-        name = max(sizes, key=lambda name: sizes[name])
+        name = max(sizes, key=sizes.__getitem__)
         yield f"fills {name}", filling(notes.long_run[name])
 
 
@@ -154,9 +152,8 @@ def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
 def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     """What fills that which lacks, and what would help."""
     for lack in result.lacks:
-        shares = notes.filled.get(lack.where)
-        if shares is not None:
-            yield f"fills {lack.where}", filling(shares)
+        if lack.where in notes.filled:
+            yield f"fills {lack.where}", filling(notes.filled[lack.where])
         yield "help", remedy(lack, notes)
 
 
@@ -164,8 +161,7 @@ def _origin(certificate: Certificate) -> Facts:
     tables, evaluations = certificate.result.controller, certificate.notes.evaluations
     rows = [("hash", certificate.hash)]
     if tables is not None:
-        rows.append(
-            ("controller", f"{len(tables.F.value)} states, the best of {evaluations} that were tried")
-        )
+        about = f"{len(tables.F.value)} states, the best of {evaluations} that were tried"
+        rows.append(("controller", about))
     rows += [(name, str(told)) for name, told in certificate.run.items() if not isinstance(told, dict)]
     return _facts(rows)
