@@ -7,7 +7,7 @@ relative to the first or to what is wished. Trusted: no.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +29,7 @@ UNSTABLE = 1e9
 ROOM = 0.95  # of an input may be used without a price: rigorous bounds are a little wider
 FREE = 0.05  # what an input that nothing limits counts, beside the widths
 SLOW = 0.03  # what lags count: twice as many must make the tube 2 % smaller
-LATER = 0.5  # what the long run counts beside the tube for ever, where the start makes them differ
+LATER = 1.0  # what the long run counts beside the tube for ever, where the start makes them differ
 WISH = 0.9  # of a half-width that is wished is aimed at
 UNASKED = 2.0  # times its first half-width is what a state may have for another one's wish
 
@@ -70,6 +70,8 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
         weights = search.run(weights)
         if not search.meets_wishes(weights):
             weights = min(weights, search.run(search.within()), key=search.value)
+        if np.isfinite(plant.wishes).any() and search.meets_wishes(weights):
+            weights = search.narrowed(weights)
     if (found := observer.table(weights)) is None:
         raise NoDesign("no_design")
     (n, m), theta = plant.B.shape, rounded(observer, found, units)
@@ -108,6 +110,7 @@ class _Search:
         self.constant = rest_at(plant, np.zeros(sum(plant.B.shape)))
         self.counts = np.array([1.0, LATER if plant.start.any() or plant.eta_start.any() else 0.0]) / self.n
         self.reference: Array | None = None
+        self.most = np.full((0, self.n), np.inf)  # of W for ever, once wishes are met
         sorts, many = np.repeat(range(6), observer.sizes()), np.repeat(observer.sizes(), observer.sizes())
         self.groups = np.array([1.0 * (sorts == sort) for sort in (1, 2, 3, 4)])
         self.singles = np.eye(len(sorts))[(many > 1) | (sorts == 0) | (sorts == 5)]
@@ -129,14 +132,17 @@ class _Search:
         The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs or the
         tube leave their room, or inputs cost nothing, and for loops that forget slowly.
         """
-        if (reached := self._reach(weights, 0 if self.reference is None else STEPS)) is None:
+        if (
+            reached := self._reach(weights, STEPS if self.reference is not None or len(self.most) else 0)
+        ) is None:
             return UNSTABLE
         response, W, U = reached
         if self.reference is None:
             value = np.exp(self.counts @ np.log(np.maximum(W, 1e-30)).sum(axis=1))
         else:
             value = (self.counts @ ((W / self.reference) ** 8).sum(axis=1)) ** (1 / 8)
-        over = np.maximum(0.0, np.r_[U / self.plant.room, W[0] / self.plant.space] - ROOM)
+        parts = U / self.plant.room, W[0] / self.plant.space, (W[0] / self.most).ravel()
+        over = np.maximum(0.0, np.concatenate(parts) - ROOM)
         free = np.where(np.isinf(self.plant.room), U, 1.0)
         return float(value * (1 + 5 * over + 50 * over**2).prod() * free.prod() ** FREE * response.lags**SLOW)
 
@@ -169,11 +175,16 @@ class _Search:
         reached = self._reach(weights, STEPS)
         return reached is not None and bool((reached[1] <= self.plant.wishes).all())
 
-    def run(self, weights: Array) -> Array:
+    def narrowed(self, weights: Array) -> Array:
+        """From weights that meet the wishes on to narrower tubes that meet them as well."""
+        self.reference, self.most = None, self.plant.wishes[None]
+        return self.run(weights, FINE[1:2])
+
+    def run(self, weights: Array, fine: Sequence[float] = FINE) -> Array:
         """Along every direction while that gains, then along the whole sweep once more."""
         best = self.value(weights)
         single = np.concatenate([self.groups, self.singles])
-        sweeps = [(factor, self.groups) for factor in COARSE] + [(factor, single) for factor in FINE]
+        sweeps = [(factor, self.groups) for factor in COARSE] + [(factor, single) for factor in fine]
         for factor, directions in sweeps:
             origin = weights
             for direction in directions:
