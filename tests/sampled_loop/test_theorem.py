@@ -6,6 +6,7 @@ Mostly x' = u at Ts = .1 under delta = -e/Ts, which forgets within a sample, so 
 
 from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise
 from math import exp, sqrt
 
 import numpy as np
@@ -143,6 +144,12 @@ def test_wind_with_a_rate_is_cut():
         close(bounds(loop, tables=controller_of(**OBSERVER), cut=cut, starts=(0, 3)).U[1], size)
 
 
+def test_h_that_began_at_0_has_its_size_once_it_is_cut():
+    loop = loop_of(uncertainty="{h: ['0.5*sin(0.8*t)']}")
+    found = bounds(loop, tables=controller_of(**OBSERVER), cut=2, lags=9, starts=(0, 3, 5, 10, 11))
+    close(found.U[1:], [0.5 + 2.5 * 0.4 * TS] * 4)
+
+
 def test_h_begins_as_it_is_at_the_start():
     for h, first in (("0.3*sin(2*t)", 0), ("0.3*cos(2*t)", 0.3)):
         found = bounds(
@@ -218,6 +225,7 @@ RANGE = ", parameters: {p: [0.9, 1.1]}"
         ({"uncertainty": "{bounds: {h: 3}}", "system": scalar("0", "1 + 0.1*x")}, 0.5, 0, (), (0.15, 0)),
         ({"disturbance": "{E: [['1 + 0.2*x']], bound: 0.3}"}, 0.5, 0, (), (0.03, 0)),
         ({"disturbance": "{E: [['1 + 0.2*x']], bound: 0.3, rate: 1}"}, 0.5, 0, [0.3], (0.03, 0)),
+        ({"trajectory": WAVE, "disturbance": "{E: [['1 + 0.2*x']], bound: 0.3}"}, 0.5, 0, (), (0.09, TS / 2)),
         ({"disturbance": "{E: [['1 + 0.6*x', '1 + 0.8*x']], bound: 0.3}", "E": [[1, 1]]}, 0.5, 0, (), (0.15, 0)),
         ({"trajectory": "{kind: equilibrium, at: [0], input: [0.02]}"}, 0.5, 0, (), (0.02, 2**-24 * 0.02)),
         ({"trajectory": WAVE.replace("cos(t)'", "cos(t) + 0.02'")}, 0.5, 0, (), (0.02, TS / 2)),
@@ -348,6 +356,20 @@ def test_exponentials_of_any_length():
         for found, part in ((phi, exact[:2, :2]), (whole, exact[:2, 2:])):
             assert (np.abs(found.mid - part) <= found.rad + 1e-12).all()
             assert (found.rad <= 1e-10).all()
+
+
+def test_what_the_rows_miss_is_counted():
+    """Rows are floats: all that they differ by from the last one times AA, exactly."""
+    loop = loop_of(**DOUBLE, A=[[0.3, 1], [-0.7, 0.1]], B=[[0], [1]], uncertainty="{h: ['0.1*sin(t)']}")
+    own = Responses(loop, controller_of([[-3.3, -4.7]]), lags=9, pieces=1, panels=1)
+    core, eta = (np.vectorize(Fraction)(part.mid) for part in own.dynamics.step())
+    rows, slow = np.vectorize(Fraction)(own.rows), np.vectorize(Fraction)(own.eta)
+    missed = sum(abs(a @ core - b) for a, b in pairwise(rows))
+    missed_slow = sum(abs(a @ eta + b - c) for a, (b, c) in zip(rows, pairwise(slow), strict=False))
+    assert missed.max() > 0
+    assert missed_slow.max() > 0
+    assert (missed <= own.missed_core).all()
+    assert (missed_slow <= own.missed_eta).all()
 
 
 def test_how_far_from_the_chord():

@@ -9,9 +9,11 @@ from flint import arb, arb_mat, ctx
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
+from tubecert.recheck.obstacles import Obstacle
 from tubecert.recheck.sampled_loop.conditions import Inequalities, phases_of
 from tubecert.recheck.sampled_loop.exponential import flow
 from tubecert.recheck.sampled_loop.loop import Loop
+from tubecert.recheck.sampled_loop.obstacles import _apart
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.rows import Ground, Problem, Signals, Start
 
@@ -187,3 +189,26 @@ def test_phases_hold_the_commands_that_wait():
     stages = [Stage(k, (Fraction(1),), (Fraction(u),), ()) for k, u in ((0, 5), (10, 3), (11, 1))]
     found = [(begin, stage.start, most) for begin, stage, (most,) in phases_of(stages, 2)]
     assert found == [(0, 0, 5), (10, 10, 5), (11, 11, 5), (12, 11, 3), (13, 11, 1)]
+
+
+def test_a_box_keeps_away_from_a_disc_as_far_as_its_corner():
+    """Corner at (0, 0), middle at (.18, .24): .3 apart."""
+    box = [(Fraction(-1), Fraction(0))] * 2
+    for radius, apart in (("0.31", False), ("0.3", False), ("0.29", True)):
+        disc = Obstacle(("p", "v"), (), (Fraction("0.18"), Fraction("0.24")), Fraction(radius), decides=True)
+        assert _apart(disc, box) is apart
+
+
+def test_a_box_keeps_away_from_a_polygon_by_an_axis_or_by_a_line():
+    corners = tuple((Fraction(x), Fraction(y)) for x, y in ((1, 0), (3, 0), (3, 2)))
+    polygon = Obstacle(("p", "v"), corners, None, None, decides=True)
+    for x, y, apart in (
+        (0, 1, True),
+        (1, 1, True),
+        (2, 0, False),
+        (3, 1, False),
+        (1, -1, False),
+        (4, 0, True),
+    ):
+        box = [(Fraction(x), Fraction(x) + Fraction(3, 4)), (Fraction(y) + Fraction(1, 2), Fraction(y) + 1)]
+        assert _apart(polygon, box) is apart, (x, y)
