@@ -188,6 +188,9 @@ class Reader:
         self.page, self.said = page, ""
         whole = [block.text for block in BLOCKS[page] if block.text.startswith("tubecert: 1")]
         Path("configs").symlink_to(ROOT / "configs")
+        for text in whole:
+            name = re.search(r"^name: (\w+)$", text, re.MULTILINE)
+            Path(f"{name[1] if name else 'spec'}.yaml").write_text(text, "utf-8")
         Path("plant.yaml").write_text([*whole, *BASES.get(page, [PLANT])][0], "utf-8")
         Path("drag.csv").write_text("v,drag\n-20,-3\n0,0\n20,3\n", "utf-8")
 

@@ -72,6 +72,7 @@ class Template(StrEnum):
 
     REGULATION = "regulation"
     TRACKING = "tracking"
+    MACHINE = "machine"
     PVTOL = "pvtol"
     CAR = "car"
     CRANE = "crane"

@@ -157,7 +157,7 @@ class SampledController:
         """The input (m,) for the state (n,) that is measured at t, in s; it acts after the delay, for a sample time.
 
         Of a family the plan comes with every sample: x* at t (n,), and u* (m,) as it is held while the input acts.
-        Raises `ValueError` if t is not the time of the next sample, if a plan is missing, or is over.
+        Raises `ValueError` if t is not the time of the next sample, if y is no state, if a plan is missing, or is over.
         """
         plan, tables = self._plan, self._tables
         if abs(t / self.sample_time - self.samples) > _ON_TIME * (1 + self.samples):
@@ -168,7 +168,10 @@ class SampledController:
             raise ValueError("the plan is over, and nothing is proven for later")
         given = (x, u) if plan.at is None else plan.at([self._row])
         planned, held = (np.ravel(np.asarray(each, float)) for each in given)
-        off = np.asarray(y, float) - planned
+        measured = np.asarray(y, float)
+        if measured.shape != planned.shape:
+            raise ValueError(f"y has {measured.size} numbers, the state has {planned.size}")
+        off = measured - planned
         command = held + tables["M"] @ self._zeta + tables["N"] @ off
         self._zeta = tables["F"] @ self._zeta + tables["G"] @ off
         self.samples += 1
