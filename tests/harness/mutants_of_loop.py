@@ -124,7 +124,7 @@ class Finder(MetaPathFinder, Loader):
 
 def documents():
     """Certificates that hold, and forged ones."""
-    texts = (files.SCALAR, files.CART, files.SWING)
+    texts = (files.SCALAR, files.CART, files.SWING, files.PAIR)
     specs = [
         load(f"{ROOT}/configs/hardware_{name}.yaml")
         for name in ("three", "car_family", "state_dependent_input")

@@ -81,6 +81,22 @@ trajectory: {kind: equilibrium, at: [1000], input: [1000]}
 initial_state: {at: [1000]}
 hardware: {rate: 10, delay: 0.05, arithmetic: single}
 """
+PAIR = """
+tubecert: 1
+name: pair
+system:
+  states: [p, q]
+  inputs: [a, b]
+  parameters: {c: [0.98, 1.02]}
+  f: ["-0.2*q", "0.1*p - 0.1*q**3"]
+  B: [[1, 0.1], [0, "c"]]
+safe_set: {p: [-3, 3], q: [-3, 3]}
+uncertainty: {h: ["0.1*sin(2*t)", "0.05*p"]}
+disturbance: {E: [[1, 0], [0.5, 1]], bound: 0.05}
+trajectory: {kind: equilibrium, at: [0, 0], input: [0, 0.1]}
+initial_state: {within: 0.05}
+hardware: {sample_time: 0.1, delay: 0.14, noise: 0.002, arithmetic: single}
+"""
 
 
 def tables(N, F=(), G=(), M=()) -> Tables:
@@ -123,6 +139,7 @@ MATRICES = {
     "swing": ([-1], [1], []),
     "family": ([0, 1, 0, -0.1], [0, 1], []),
     "far": ([-1], [1], []),
+    "pair": ([0, -0.2, 0.1, 0], [1, 0.1, 0, 1], [1, 0, 0.5, 1]),
 }
 GAINS = {
     SCALAR: ([[-3]],),
@@ -130,6 +147,7 @@ GAINS = {
     SWING: ([[-2]],),
     FAMILY: ([[-4, -4]],),
     FAR: ([[-1]],),
+    PAIR: ([[-2, 0], [0, -2]], [[0.25]], [[0.5, 0.25]], [[0.5], [-0.25]]),
 }
 
 

@@ -3,7 +3,7 @@
 import copy
 
 import pytest
-from sampled_files import CART, FAMILY, FAR, SCALAR, SWING, changed, examine, made, resealed, why_not
+from sampled_files import CART, FAMILY, FAR, PAIR, SCALAR, SWING, changed, examine, made, resealed, why_not
 
 from tubecert.errors import ExitCode
 from tubecert.spec import load_text
@@ -11,7 +11,7 @@ from tubecert.spec.canonical import canonical
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", [SCALAR, CART, SWING, FAMILY, FAR])
+@pytest.mark.parametrize("text", [SCALAR, CART, SWING, FAMILY, FAR, PAIR])
 def test_what_is_certified_is_confirmed(text):
     document = made(text)
     assert document["result"]["verdict"] == "certified"
@@ -40,6 +40,12 @@ LIES = {
     "Z x .98": (CART, ("tube", 0, "memory", 0), narrower),
     "the long run from the start on": (SCALAR, ("tube",), lambda own: [{**own[-1], "start": 0}]),
     "a stage that begins too early": (SCALAR, ("tube", 1, "start"), 1),
+    "W x .98, of two inputs": (PAIR, ("tube", 0, "half_widths", "q"), narrower),
+    "U x .98, of two inputs": (PAIR, ("tube", -1, "deviations", "b"), narrower),
+    "a larger ball of starts": (PAIR, spec("initial_state", "within"), "0.055"),
+    "a wider range, of two inputs": (PAIR, spec("system", "parameters", "c"), ["0.93", "1.07"]),
+    "more wind, of two inputs": (PAIR, spec("disturbance", "bound"), "0.055"),
+    "an input on another one's place": (PAIR, ("controller", "M", "rows"), lambda own: own[::-1]),
     "noise twice": (SCALAR, spec("hardware", "noise", "x"), "0.02"),
     "noise of a length twice": (CART, spec("hardware", "noise"), "0.002"),
     "wind of a component twice": (SCALAR, spec("disturbance", "bound", 0), "0.4"),
