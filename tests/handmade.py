@@ -1,5 +1,6 @@
 """Certificates of small loops, made by hand: what is proven of them is not true, and code does not care."""
 
+import hashlib
 from fractions import Fraction
 
 import numpy as np
@@ -40,10 +41,16 @@ limits: {F: [-8, 8]}
 """
 
 
-def tables(z: int, seed: int = 0) -> Tables:
-    """Tables of single precision of a controller with z states, two measured ones, one input."""
+def source(data: dict[str, object], text: str = "", **changes: object) -> Source:
+    """Where a canonical specification comes from."""
+    file_hash = f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+    return Source(effective=Effective.of(data), effective_hash=digest(data), file_hash=file_hash, **changes)
+
+
+def tables(z: int, seed: int = 0, n: int = 2, m: int = 1) -> Tables:
+    """Tables of single precision of a controller with z states, n measured ones, m inputs."""
     draw = np.random.default_rng(seed)
-    sizes = {"F": (z, z), "G": (z, 2), "M": (1, z), "N": (1, 2)}
+    sizes = {"F": (z, z), "G": (z, n), "M": (m, z), "N": (m, n)}
     drawn = {name: draw.uniform(-1, 1, size).astype(np.float32) for name, size in sizes.items()}
     drawn["F"] /= np.float32(2 * z + 1)  # stable
     return Tables(**{name: HexMatrix(matrix.astype(float)) for name, matrix in drawn.items()})
@@ -73,7 +80,7 @@ def certificate(
     stages = [(0, "0.3", "0.5"), (40, "0.2", "0.6")]
     fields = {
         "verdict": Verdict.CERTIFIED,
-        "spec": Source(effective=Effective.of(data), effective_hash=digest(data), file_hash="sha256:0"),
+        "spec": source(data),
         "claim": Claim(horizon=None, afterwards=afterwards, hold=hold),
         "planned": planned,
         "nominal": Nominal(

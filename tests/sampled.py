@@ -1,29 +1,23 @@
 """Certificates of sampled loops with everything that can be shown, made by hand: no proof of anything."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
+import handmade
 
-from tubecert.certificate.effective import Effective
-from tubecert.certificate.file import digest
 from tubecert.sampled_loop.file import seal
 from tubecert.sampled_loop.record import (
     Certificate,
     Claim,
     Cleared,
-    HexMatrix,
     InputUse,
     Lack,
     Notes,
     Result,
     Shares,
-    Source,
     Stage,
-    Tables,
 )
 from tubecert.spec import canonical, load_text
 from tubecert.verdict import Verdict
@@ -67,50 +61,32 @@ NARROW = Shares(noise=0.011, holding=0.002, uncertainty=0.0, wind=0.02, start=0.
 PUSH = Shares(noise=0.7, holding=0.1, uncertainty=0.0, wind=0.4, start=1.9, remainder=0.0)
 
 
-def matrix(*rows: list[float]) -> HexMatrix:
-    return HexMatrix(np.array(rows, dtype=float).reshape(len(rows), -1))
-
-
 def certificate(text: str = SPEC, settings: Mapping[str, str] | None = None, **changes: Any) -> Certificate:
     """The certificate of a specification: 0.13201 wide at the start, .034 in the long run; `changes` of its result."""
-    spec = load_text(text, "cart.yaml")
-    data, (states, inputs) = canonical(spec), (spec.states, spec.inputs)
-    stages = tuple(
-        Stage(
-            start=start,
-            half_widths=dict.fromkeys(states, Fraction(wide)),
-            deviations=dict.fromkeys(inputs, Fraction(push)),
-            memory=(Fraction("0.3"),),
-        )
-        for start, wide, push in ((0, "0.13201", "3.1"), (800, "0.034", "1.2"))
-    )
-    n, m = len(states), len(inputs)
-    ends = (Fraction("-3.1"), Fraction("3.1"))
+    spec = load_text(text)
+    (states, inputs), ends = (spec.states, spec.inputs), (Fraction("-3.1"), Fraction("3.1"))
+
+    def stage(start: int, wide: str, push: str) -> Stage:
+        sizes = {"half_widths": dict.fromkeys(states, Fraction(wide))}
+        sizes["deviations"] = dict.fromkeys(inputs, Fraction(push))
+        return Stage(start=start, **sizes, memory=(Fraction("0.3"),))
+
     result = Result(
         verdict=Verdict.CERTIFIED,
-        spec=Source(
-            effective=Effective.of(data),
-            effective_hash=digest(data),
-            file_hash=f"sha256:{hashlib.sha256(text.encode()).hexdigest()}",
-            settings=settings or {},
-        ),
+        spec=handmade.source(canonical(spec), text, settings=settings or {}),
         claim=Claim(horizon=None, afterwards="nothing", hold="middle"),
-        controller=Tables(
-            F=matrix([0.5]), G=matrix([1.0] * n), M=matrix(*[[-2.0]] * m), N=matrix(*[[-4.0] * n] * m)
-        ),
-        tube=stages,
+        controller=handmade.tables(1, n=len(states), m=len(inputs)),
+        tube=(stage(0, "0.13201", "3.1"), stage(800, "0.034", "1.2")),
         inputs=tuple(InputUse(input=name, range=ends, limits=own) for name, own in spec.limits),
         clearance=tuple(Cleared(index=i, verdict=Verdict.CERTIFIED) for i in range(len(spec.obstacles))),
     )
-    family = spec.trajectory.bundle is not None
+    points = {"samples_t": (0.0,), "samples_x": ((0.0,) * len(states),), "samples_u": ((0.0,) * len(inputs),)}
     notes = Notes(
         start=dict.fromkeys(states, WIDE),
         long_run=dict.fromkeys(states, NARROW),
         deviations=dict.fromkeys(inputs, PUSH),
-        samples_t=() if family else (0.0,),
-        samples_x=() if family else ((0.0,) * n,),
-        samples_u=() if family else ((0.0,) * m,),
         evaluations=4_000,
+        **(points if spec.trajectory.bundle is None else {}),
     )
     return seal(replace(result, **changes), notes, {"command": "tubecert certify cart.yaml"})
 

@@ -4,12 +4,11 @@ from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
+from handmade import source
 
-from tubecert.certificate.effective import Effective
-from tubecert.certificate.file import digest
 from tubecert.loop_design.proposal import propose
 from tubecert.model import build
-from tubecert.sampled_loop.record import Claim, HexMatrix, Nominal, Result, Source, Tables
+from tubecert.sampled_loop.record import Claim, HexMatrix, Nominal, Result
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.setting import Controller, Loop
 from tubecert.sampled_loop.theorem import check
@@ -62,19 +61,18 @@ def proven(name: str) -> Result:
     text, *matrices, gain = ABOUT[name]
     A, B, E = (np.atleast_2d(np.array(value, dtype=float)) for value in matrices)
     spec, N = load_text(text), np.array(gain, dtype=float)
-    model, empty = build(spec), np.zeros((0, len(A)))
+    model = build(spec)
     loop = Loop(spec=spec, model=model, plan=plan_of(spec, model), knots=None, slow=True, A=A, B=B, E=E)
-    own = {"F": np.zeros((0, 0)), "G": empty, "M": np.zeros((len(N), 0)), "N": N}
-    inequalities, stages = propose(Remainders(loop, 64), Controller(**own))
-    checked = check(loop, Controller(**own), stages, inequalities.recipe, inequalities)
+    own = Controller(np.zeros((0, 0)), np.zeros((0, len(A))), np.zeros((len(N), 0)), N)
+    inequalities, stages = propose(Remainders(loop, 64), own)
+    checked = check(loop, own, stages, inequalities.recipe, inequalities)
     assert checked.verdict is Verdict.CERTIFIED, checked.lacks
-    data = canonical(spec)
     return Result(
         verdict=checked.verdict,
-        spec=Source(effective=Effective.of(data), effective_hash=digest(data), file_hash="sha256:0"),
+        spec=source(canonical(spec)),
         claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
         nominal=Nominal(A=HexMatrix(A), B=HexMatrix(B), E=HexMatrix(E)),
-        controller=Tables(**{key: HexMatrix(value) for key, value in own.items()}),
+        controller=own.record(),
         tube=stages,
         inputs=checked.inputs,
         clearance=checked.clearance,
