@@ -56,6 +56,13 @@ def tables(z: int, seed: int = 0, n: int = 2, m: int = 1) -> Tables:
     return Tables(**{name: HexMatrix(matrix.astype(float)) for name, matrix in drawn.items()})
 
 
+def no_controller() -> Tables:
+    """Tables that add nothing."""
+    own = tables(0)
+    own.N.value[:] = 0
+    return own
+
+
 def certificate(
     trajectory: str = REST,
     *,

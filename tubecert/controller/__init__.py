@@ -7,7 +7,7 @@ the same, and beside them what belongs to the certificate: `controller_data.h`, 
 | module | what it does |
 |---|---|
 | `plans` | what the computer knows of the plan: a row per sample, a formula, or nothing |
-| `data` | the header with the tables, limits and samples of the self-test |
+| `data` | what belongs to the certificate: tables, limits, the plan, and their texts |
 | `folder` | the files, and how they are written |
 | `compiled` | the same files, compiled here, for many loops at once |
 """

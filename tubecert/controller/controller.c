@@ -1,4 +1,3 @@
-/* tubecert export, certificate any, text sha256:1fb9eb6c0ecd073d5b9d52b608481556a682525889f6407dc661bb20be966060 */
 /* delta = M zeta + N dy, u = us + delta, zeta' = F zeta + G dy, with dy = y - xs. Every order of these sums, with fused
    multiply-adds or without, loses at most gamma(NZ + NX + 3) of the sum of their sizes, which is proven for. */
 #define CONTROLLER_TABLES

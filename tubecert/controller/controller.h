@@ -1,4 +1,3 @@
-/* tubecert export, certificate any, text sha256:8e926684589ca04b98472a57bf9d64287f965ce88222948ab57183349fc003f1 */
 /* The controller of a certificate of the sampled loop: C99, no memory of its own, no library but the math of a plan
    that is a formula. Once per sample, and once only: read the sensors, call controller_step, hand u to the actuators
    after the delay of the certificate. Compile without -ffast-math. One State for each of any number of loops. */

@@ -1,6 +1,6 @@
-"""What belongs to one certificate, as a header in C: sizes, tables, limits, the plan, samples of the self-test.
+"""What belongs to one certificate: sizes, tables, limits and the plan, as a header in C and in a text for people.
 
-Tables and plan are numbers of single precision, written digit for digit; limits are numbers of the arithmetic that the
+Tables and limits are written in hexadecimal digits, exactly as they are. Limits are numbers of the arithmetic that the
 controller computes in, rounded to the side on which nothing that is proven is cut off, and nothing else let through.
 """
 
@@ -15,25 +15,22 @@ from typing import Any, Final
 
 import numpy as np
 
-from tubecert.controller.plans import Planned, braces, literal, planned, question, refused
+from tubecert.controller.plans import Planned, planned, question, refused
 from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.record import Certificate
 from tubecert.verdict import Verdict
 
 HOME: Final = Path(__file__).parent
-_ROUNDING: Final = Fraction(
-    1, 2**20
-)  # of |x*| and a width: more than rounding adds to a sample that is right
-_FAR: Final = 64  # as in controller.c
-_SAMPLES: Final = 12  # of the self-test,
-_FIRST: Final = 100_000  # among so many
+_OWN: Final = ("controller_data.h", "README.txt")
+_ROUNDING: Final = Fraction(1, 2**21)  # of |x| and a width: more than rounding adds to a sample that is right
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Data:
-    """A controller: tables (see `sampled_loop.record.Tables`), its limits, its plan; times in s.
+    """A controller: its plan and arrays by the names that they have in C; times in s.
 
-    `reach` (n,): how far from the plan a sample may lie; `memory` (z,), `low` and `high` (m,).
+    `tables` as in `sampled_loop.record.Tables`; `limits`: `reach` (n,), how far from the plan a sample may lie,
+    `memory` (z,), `low` and `high` (m,).
     """
 
     name: str
@@ -42,22 +39,19 @@ class Data:
     sample_time: Fraction
     delay: Fraction
     tables: Mapping[str, Array]
-    reach: Array
-    memory: Array
-    low: Array
-    high: Array
+    limits: Mapping[str, Array]
     plan: Planned
 
     @property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of states, inputs, and states of the controller."""
-        return len(self.reach), len(self.low), len(self.memory)
+        m, n = self.tables["N"].shape
+        return n, m, len(self.tables["F"])
 
     @property
     def work(self) -> int:
         """Multiply-adds of a sample; the tables have as many numbers."""
-        n, m, z = self.sizes
-        return (z + m) * (z + n)
+        return sum(table.size for table in self.tables.values())
 
 
 def data_of(certificate: Certificate) -> Data:
@@ -70,15 +64,19 @@ def data_of(certificate: Certificate) -> Data:
     if tables is None or not (tables.M.value.any() or tables.N.value.any()):
         raise refused("the certificate has no controller", "certify with `controller: auto`")
     spec = question(result)
-    machine, names = spec.hardware, spec.states
+    machine = spec.hardware
     assert machine is not None
     real: type[np.floating[Any]] = np.float32 if machine.arithmetic == "single" else np.float64
-    plan = planned(result, spec, real)
-    noise = machine.noise if isinstance(machine.noise, tuple) else (machine.noise,) * len(names)
-    widths = (max(stage.half_widths[name] for stage in result.tube) for name in names)
-    sides = zip(widths, noise, map(Fraction, plan.sizes.tolist()), strict=True)
+    noise = machine.noise if isinstance(machine.noise, tuple) else (machine.noise,) * len(spec.states)
+    widths = (max(stage.half_widths[name] for stage in result.tube) for name in spec.states)
+    off = [(w + n, max(map(abs, box))) for w, n, box in zip(widths, noise, spec.safe_set, strict=True)]
     ranges = {use.input: use.range for use in result.inputs}
-    memory = zip(*(stage.memory for stage in result.tube), strict=True)
+    limits = {
+        "reach": (1, [far + _ROUNDING * (far + size) for far, size in off]),
+        "memory": (-1, [max(own) for own in zip(*(stage.memory for stage in result.tube), strict=True)]),
+        "low": (1, [ranges[name][0] for name in spec.inputs]),
+        "high": (-1, [ranges[name][1] for name in spec.inputs]),
+    }
     return Data(
         name=spec.name,
         hash=certificate.hash,
@@ -86,67 +84,44 @@ def data_of(certificate: Certificate) -> Data:
         sample_time=machine.sample_time,
         delay=machine.delayed,
         tables={name: getattr(tables, name).value for name in "FGMN"},
-        reach=_next([w + n + _ROUNDING * (w + n + x) for w, n, x in sides], real, 1),
-        memory=_next([max(own) for own in memory], real, -1),
-        low=_next([ranges[name][0] for name in spec.inputs], real, 1),
-        high=_next([ranges[name][1] for name in spec.inputs], real, -1),
-        plan=plan,
+        limits={name: np.array([_next(q, side, real) for q in own]) for name, (side, own) in limits.items()},
+        plan=planned(result, spec),
     )
 
 
-def _next(values: Sequence[Fraction], real: type[np.floating[Any]], side: int) -> Array:
-    """Numbers of the arithmetic next to exact ones: not below them (side 1), or not above them (-1)."""
-    near = [real(float(q)) for q in values]
-    own = [
-        x if side * Fraction(float(x)) >= side * q else np.nextafter(x, real(side * np.inf))
-        for x, q in zip(near, values, strict=True)
-    ]
-    return np.array(own, dtype=float)
+def _next(q: Fraction, side: int, real: type[np.floating[Any]]) -> float:
+    """The number of the arithmetic next to an exact one: not below it (side 1), or not above it (-1)."""
+    near = real(float(q))
+    inside = side * Fraction(float(near)) >= side * q
+    return float(near if inside else np.nextafter(near, real(side * np.inf)))
 
 
-def header(data: Data) -> str:
-    """The text of `controller_data.h`, but for its first line."""
-    (n, m, z), kind, plan = data.sizes, "float" if data.real is np.float32 else "double", data.plan
-    samples = np.arange(_SAMPLES) * (min(plan.steps, _FIRST) - 1) // (_SAMPLES - 1)
-    part = ((7 * np.arange(_SAMPLES)[:, None] + 5 * np.arange(n + m + z)) % 13 - 6) / 64  # no limit acts
-    xs, us = (part[:, :n], part[:, n : n + m]) if plan.at is None else plan.at(samples.tolist())
-    y = (xs + part[:, :n] * data.reach).astype(data.real).astype(float)
-    zeta = (part[:, n + m :] * data.memory).astype(data.real).astype(float)
-    exact = [exact_step(data, *own) for own in zip(zeta, y, xs, us, strict=True)]
-    u, later = (np.array([[float(q) for q in step[i]] for step in exact]) for i in (0, 1))
-    tables = {name: braces("float", own) for name, own in data.tables.items()}
-    limits = {name: braces(kind, getattr(data, name)) for name in ("reach", "memory", "low", "high")}
-    tests = {name: braces(kind, own) for name, own in {"zeta": zeta, "y": y, "xs": xs, "us": us}.items()}
-    tests |= {"u": braces("double", u), "next": braces("double", later)}
-    sizes = {"n": n, "m": m, "z": z, "tests": _SAMPLES, "steps": plan.steps, "after": plan.after}
-    places: dict[str, Any] = {**tables, **limits, **tests, **sizes}
-    return Template((HOME / "controller_data.h.in").read_text("utf-8")).substitute(
-        places,
-        name=data.name,
-        hash=data.hash,
-        real=kind,
-        kind=plan.kind,
-        plan=plan.text,
-        period=literal("double", float(data.sample_time)),
-        delay=literal("double", float(data.delay)),
-        k=f"{{{', '.join(f'{k}u' for k in samples)}}}",
-    )
+def texts(data: Data) -> dict[str, str]:
+    """The files that belong to the certificate, by their names."""
+    (n, m, z), plan = data.sizes, data.plan
+    over = f"after {plan.steps} samples: the last command is held from then on, and STATUS_END is told"
+    matrices = {**data.tables, "xs": plan.rows[0], "us": plan.rows[1]}
+    places: dict[str, object] = {
+        **{name: "{" + ",\n".join(map(_row, own.tolist() or [[]])) + "}" for name, own in matrices.items()},
+        **{name: _row(own.tolist()) for name, own in data.limits.items()},
+        **{"name": data.name, "hash": data.hash, "n": n, "m": m, "z": z, "work": data.work},
+        **{"period": float(data.sample_time), "delay": float(data.delay), "lead": float(plan.lead)},
+        **{
+            "kind": plan.kind,
+            "steps": plan.steps,
+            "after": plan.after,
+            "rows": len(plan.rows[0]),
+            "every": plan.every,
+        },
+        "real": "float" if data.real is np.float32 else "double",
+        "formula_x": plan.formula[0],
+        "formula_u": plan.formula[1],
+        "handed": "xs, us, " if plan.at is None else "",
+        "end": over if plan.after == plan.steps else "never",
+    }
+    return {name: Template((HOME / f"{name}.in").read_text("utf-8")).substitute(places) for name in _OWN}
 
 
-def exact_step(
-    data: Data, zeta: Array, y: Array, xs: Array, us: Array
-) -> tuple[list[Fraction], list[Fraction]]:
-    """The inputs and the next zeta in exact arithmetic, for a sample within reach and a zeta within its memory."""
-    dy = [Fraction(a) - Fraction(b) for a, b in zip(y.tolist(), xs.tolist(), strict=True)]
-    seen = [*map(Fraction, zeta.tolist()), *dy]
-
-    def of(left: str, right: str) -> list[Fraction]:
-        rows = np.hstack([data.tables[left], data.tables[right]]).tolist()
-        return [sum((Fraction(c) * v for c, v in zip(row, seen, strict=True)), Fraction(0)) for row in rows]
-
-    planned = zip(
-        map(Fraction, us.tolist()), of("M", "N"), data.low.tolist(), data.high.tolist(), strict=True
-    )
-    most = (_FAR * Fraction(x) for x in data.memory.tolist())
-    later = [min(max(v, -x), x) for v, x in zip(of("F", "G"), most, strict=True)]
-    return [min(max(u + v, Fraction(a)), Fraction(b)) for u, v, a, b in planned], later
+def _row(values: Sequence[float]) -> str:
+    """An array of C; a 0 where it would be empty, which C does not allow."""
+    return "{" + ", ".join(x.hex() for x in values or [0.0]) + "}"

@@ -1,17 +1,18 @@
 """What the computer knows of a plan: x* at every sample and u* as it is held while that sample's command acts.
 
-In: a certificate. Out: a table of single precision, a formula of t in C, or nothing where a planner hands x* and u* in.
-Both are within 2^-24 of the size of the plan, which the certificate allows for. Command k acts from k Ts + delay on for
-Ts; what is held is u* in the middle of that time, or at its beginning.
+In: a certificate. Out: rows of single precision, and a formula of t in C where the plan goes on for ever, both within
+2^-24 of the size of the plan, which the certificate allows for. Command k acts from k Ts + delay on for Ts; what is
+held is u* in the middle of that time, or at its beginning. For a family a planner hands x* and u* in.
 """
 
 from __future__ import annotations
 
+import ast
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -19,36 +20,40 @@ import numpy as np
 from tubecert.certificate.file import dump
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
-from tubecert.expression import FUNCTIONS, Expression, symbol
-from tubecert.expression.graph import topological
+from tubecert.expression import FUNCTIONS
 from tubecert.findings import Finding
-from tubecert.model import TIME, build
+from tubecert.model import build
 from tubecert.sampled_loop.record import Result
 from tubecert.spec import Knots, Spec, load_text
 from tubecert.trajectory.hermite import intervals
+from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 from tubecert.trajectory.plan import Plan
 
-FOR_EVER: Final = 2**30  # samples of a formula: up to there its time in double is that of the sample
+_FOR_EVER: Final = 2**30  # samples of a formula: up to there its time in double is that of the sample
+_EVERY: Final = 4096  # of them one in the self-test
 _MOST_ROWS: Final = 1_000_000
+_SIGNS: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 At: TypeAlias = Callable[[Sequence[int]], tuple[Array, Array]]
-_WINDOWS: Final = 256  # of the plan, in which its size is looked for
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Planned:
-    """The plan of a computer: `kind` is the macro of the C code, `text` its definitions.
+    """The plan of a computer: `kind` is the macro of the C code.
 
-    After `steps` samples sample `after` is next: `steps` itself is the end. `sizes` (n,) bounds |x*|; `at` is the plan
-    of some samples, (N, n) and (N, m), in numbers of the computer; None where it is handed in.
+    After `steps` samples sample `after` is next: `steps` itself is the end. `lead`, s: from a sample to the u* that is
+    held for it. `at` is the plan of some samples, (N, n) and (N, m), None where it is handed in; `rows` is that of all
+    samples, of a formula that of one of `every`, of a family 0. `formula`: lines of C that set xs, and those for us.
     """
 
     kind: str
-    text: str
     steps: int
     after: int
-    sizes: Array
+    lead: Fraction
+    rows: tuple[Array, Array]
     at: At | None
+    every: int = 1
+    formula: tuple[str, str] = ("", "")
 
 
 def refused(message: str, help: str = "") -> TubecertError:
@@ -65,63 +70,49 @@ def question(result: Result) -> Spec:
     return load_text(effective.at_rest(unused), "certificate")
 
 
-def planned(result: Result, spec: Spec, real: type[np.floating[Any]]) -> Planned:
+def planned(result: Result, spec: Spec) -> Planned:
     """What the computer of a certificate knows of its plan. Raises TC710 for a plan that cannot be written down."""
     hardware, horizon, afterwards = spec.hardware, spec.trajectory.horizon, result.claim.afterwards
     assert hardware is not None
-    period = hardware.sample_time
+    period, goes_on = hardware.sample_time, spec.trajectory.kind == "expressions" and afterwards == "repeat"
     lead = hardware.delayed + (period / 2 if result.claim.hold == "middle" else 0)
-    count = 1 if horizon is None else ceil(horizon / period)
-    steps, after = (count, count) if horizon is not None and afterwards == "nothing" else (1, 0)
-    if spec.trajectory.bundle is not None:
-        sizes = np.array([max(map(abs, ends)) for ends in spec.trajectory.bundle.x], dtype=float)
-        return Planned(kind="PLAN_HANDED", text="", steps=steps, after=after, sizes=sizes, at=None)
-    plan = _plan(result, spec)
-    again, known = afterwards == "repeat", isinstance(plan, PiecewisePlan)
-    formula = again and not known and not plan.is_constant
-    if formula:
-        steps = after = FOR_EVER
-    elif not plan.is_constant:
-        steps = count + (afterwards == "rest")
+    steps, after = 1, 0
+    if goes_on:
+        steps = after = _FOR_EVER
+    elif horizon is not None:
+        steps = math.ceil(horizon / period) + (afterwards == "rest")
         after = {"nothing": steps, "rest": steps - 1, "repeat": 0}[afterwards]
-
-    def during(t: Fraction) -> Fraction:
-        if formula or horizon is None:
-            return t
-        return t % horizon if again else min(t, horizon)
-
-    def at(samples: Sequence[int]) -> tuple[Array, Array]:
-        x = _values(plan, [during(k * period) for k in samples])[0]
-        u = _values(plan, [during(k * period + lead) for k in samples])[1]
-        digits = real if formula else np.float32
-        return x.astype(digits).astype(float), u.astype(digits).astype(float)
-
-    edges = np.linspace(0.0, float(horizon or 0), _WINDOWS + 1)
-    return Planned(
-        kind="PLAN_FORMULA" if formula else "PLAN_TABLE",
-        text=_formula(plan, lead) if formula else _table(steps, at),
-        steps=steps,
-        after=after,
-        sizes=plan.enclose(edges[:-1], edges[1:])[0].magnitude.max(axis=0),
-        at=at,
-    )
-
-
-def _table(steps: int, at: At) -> str:
-    if steps > _MOST_ROWS:
+    if spec.trajectory.bundle is not None:
+        rows = np.zeros((1, len(spec.states))), np.zeros((1, len(spec.inputs)))
+        return Planned("PLAN_HANDED", steps, after, lead, rows, None)
+    if not goes_on and steps > _MOST_ROWS:
         message = f"the plan has {steps:,} samples; a table has at most {_MOST_ROWS:,}"
         raise refused(message, "certify a shorter plan")
-    x, u = (braces("float", own) for own in at(range(steps)))
-    return f"static const float XS[STEPS][NX] = {x};\nstatic const float US[STEPS][NU] = {u};"
+    plan = _plan(result, spec)
+
+    def during(t: Fraction) -> Fraction:
+        if goes_on or horizon is None:
+            return t
+        return t % horizon if afterwards == "repeat" else min(t, horizon)
+
+    def at(samples: Sequence[int]) -> tuple[Array, Array]:
+        now, then = ([during(k * period + later) for k in samples] for later in (Fraction(0), lead))
+        return _values(plan, now)[0], _values(plan, then)[1]
+
+    if goes_on:
+        rows = at(range(0, 16 * _EVERY, _EVERY))
+        own = result.spec.effective.part("trajectory")
+        formula = _formula("xs", own["x"]), _formula("us", own["u"])
+        return Planned("PLAN_FORMULA", steps, after, lead, rows, at, _EVERY, formula)
+    return Planned("PLAN_TABLE", steps, after, lead, at(range(steps)), at)
 
 
 def _plan(result: Result, spec: Spec) -> Plan:
-    own, trajectory = result.planned, spec.trajectory
-    if own is not None:
-        knots = Knots(t=own.t, x=own.x, u=own.u, interpolation=own.interpolation)
-        return piecewise_plan(build(spec), knots, trajectory.horizon)
-    x, u = (tuple(term.expression for term in terms) for terms in (trajectory.x, trajectory.u))
-    return Plan(x, u, trajectory.horizon)
+    model, own = build(spec), result.planned
+    if own is None:
+        return plan_of(spec, model)
+    knots = Knots(t=own.t, x=own.x, u=own.u, interpolation=own.interpolation)
+    return piecewise_plan(model, knots, spec.trajectory.horizon)
 
 
 def _values(plan: Plan, times: Sequence[Fraction]) -> tuple[Array, Array]:
@@ -131,52 +122,31 @@ def _values(plan: Plan, times: Sequence[Fraction]) -> tuple[Array, Array]:
         last = len(plan.pieces) - 1
         span = np.array([min(bisect_right(plan.data.t, t) - 1, last) for t in times], dtype=float)
     x, u = plan.enclose(window.lo, window.hi, span)
-    return x.mid, u.mid
+    return x.mid.astype(np.float32).astype(float), u.mid.astype(np.float32).astype(float)
 
 
-def braces(kind: str, rows: Array) -> str:
-    """An array of C, of one or two dimensions, digit for digit; a 0 where it would be empty, which C does not allow."""
-    if rows.size == 0:
-        return "{{0}}" if rows.ndim == 2 else "{0}"
-    if rows.ndim == 1:
-        return f"{{{', '.join(literal(kind, x) for x in rows)}}}"
-    return "{\n" + "".join(f"  {braces(kind, row)},\n" for row in rows) + "}"
+def _formula(names: str, texts: Any) -> str:
+    """Lines of C that compute expressions of a double t."""
+    roots = (ast.parse(text, mode="eval").body for text in texts)
+    return "\n".join(f"  {names}[{i}] = (real){_in_c(root)};" for i, root in enumerate(roots))
 
 
-def literal(kind: str, value: float) -> str:
-    """A float as a literal of its type: exactly that number, in hexadecimal digits."""
-    digits, power = float(value).hex().split("p")
-    return f"{digits.rstrip('0').removesuffix('.')}p{power}{'f' if kind == 'float' else ''}"
-
-
-def _formula(plan: Plan, lead: Fraction) -> str:
-    """x* of the sample's time, u* of that and `lead`: a function in C, one operation a line, all in double."""
-    lines = ["#include <math.h>", "static inline void plan(uint32_t k, real xs[NX], real us[NU]) {"]
-    for target, roots, later in (("xs", plan.x, 0.0), ("us", plan.u, float(lead))):
-        names: dict[Expression, str] = {symbol(TIME): f"t_{target}"}
-        lines.append(f"  const double t_{target} = (double)k * SAMPLE_TIME + {literal('double', later)};")
-        lines.append(f"  (void)t_{target};")
-        for node in topological(roots):
-            if node.op != "symbol":
-                names[node] = f"{target}_{len(names)}"
-                made = _operation(node, [names[arg] for arg in node.args])
-                lines.append(f"  const double {names[node]} = {made};")
-        lines += [f"  {target}[{i}] = (real){names[root]};" for i, root in enumerate(roots)]
-    return "\n".join([*lines, "}"])
-
-
-def _operation(node: Expression, args: Sequence[str]) -> str:
-    match node.op:
-        case "const":
-            return literal("double", node.fraction.numerator / node.fraction.denominator)
-        case "pi":
-            return literal("double", np.pi)
-        case "add" | "mul" | "div":
-            return {"add": " + ", "mul": " * ", "div": " / "}[node.op].join(args)
-        case "pow":
-            return f"pow({args[0]}, {node.value}.0)"
-        case op if op in FUNCTIONS:
-            return f"{op}({args[0]})"
-    raise refused(
-        f"the plan contains {node.op}, which C does not have", "give the plan as a file (kind: csv)"
-    )
+def _in_c(node: ast.expr) -> str:
+    """An expression of t in the grammar of specifications as one in C, all in double."""
+    match node:
+        case ast.Name(id="t"):
+            return "t"
+        case ast.Name(id="pi"):
+            return math.pi.hex()
+        case ast.Constant(value=int() | float() as value):
+            return float(value).hex()
+        case ast.UnaryOp(operand=inner):
+            return f"(-{_in_c(inner)})"
+        case ast.BinOp(left=base, op=ast.Pow(), right=power):
+            return f"pow({_in_c(base)}, {_in_c(power)})"
+        case ast.BinOp(left=left, op=op, right=right):
+            return f"({_in_c(left)} {_SIGNS[type(op)]} {_in_c(right)})"
+        case ast.Call(func=ast.Name(id=name), args=[argument]) if name in FUNCTIONS:
+            return f"{name}({_in_c(argument)})"
+    message = f"the plan contains {ast.unparse(node)[:60]}, which C does not have"
+    raise refused(message, "give the plan as a file (kind: csv)")

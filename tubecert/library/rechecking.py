@@ -105,13 +105,12 @@ def with_controller(found: Recheck, text: str, name: str, folder: str) -> Rechec
     Raises `CertificateError` for the certificate of a loop in continuous time.
     """
     from tubecert.recheck.sampled_loop.exported import exported
-    from tubecert.recheck.sampled_loop.record import read_certificate
 
     own = document.read(text, name)
     if own.mapping()["format"] != document.SAMPLED_LOOP:
         help = "leave --controller out, or give the certificate of a specification with hardware"
         raise document.wrong("TC601", f"{name} is about a loop in continuous time, which has no code", help)
-    more = (Examined(*each) for each in exported(read_certificate(own), folder))
+    more = (Examined(*each) for each in exported(own, folder))
     return replace(found, claims=(*found.claims, *more))
 
 

@@ -7,36 +7,43 @@ or goes on where it is a formula.
 
 from __future__ import annotations
 
-import re
+import ast
+import math
+import operator
 import struct
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from fractions import Fraction
-from math import ceil
 from typing import Final
 
-from flint import ctx
+from flint import arb, ctx
 
-from tubecert.recheck.balls import Ball, exact, floor
+from tubecert.recheck.balls import Ball, exact, floor, power
 from tubecert.recheck.program import Program
 from tubecert.recheck.sampled_loop.windows import Course
-from tubecert.recheck.terms import Term, number, operation, variable
+from tubecert.recheck.specified.trajectory import Expressed
+from tubecert.recheck.terms import operation, variable
 
-HEX: Final = r"-?0x[01](?:\.[0-9a-f]+)?p[-+]\d{1,4}"
-_ACCURACY: Final = Fraction(1, 2**24)  # of a plan in the computer, of its largest size
-_EVER: Final = 2**30  # samples of a formula
-_LOOKED_AT: Final = 256  # samples of a formula, among the first ones
-_ROWS: Final = re.compile(
-    r"static const float XS\[STEPS\]\[NX\] = ([^;]*);\nstatic const float US\[STEPS\]\[NU\] = ([^;]*);"
+_ACCURACY: Final = 2.0**-24  # of a plan in the computer, of its largest size
+_EVER: Final = 2**30  # samples of a formula,
+_EVERY: Final = 4096  # ... of them one for the self-test,
+_LOOKED_AT: Final = (*range(256), *(2**j - 1 for j in range(9, 31)))  # ... and of them here
+_SIGNS: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+_APPLIED: Final = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+_FUNCTIONS: Final = (
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "exp",
+    "log",
+    "sqrt",
 )
-_NAMES: Final = "sin|cos|tan|asin|acos|atan|sinh|cosh|tanh|exp|log|sqrt"
-_HEAD: Final = "static inline void plan(uint32_t k, real xs[NX], real us[NU]) {"
-_CLOCK: Final = re.compile(rf"  const double (t_[xu]s) = \(double\)k \* SAMPLE_TIME \+ ({HEX});")
-_LINE: Final = re.compile(
-    rf"  const double (\w+) = (?:({HEX})|(\w+) ([+*/]) (\w+)|pow\((\w+), (-?\d+)\.0\)|({_NAMES})\((\w+)\));"
-)
-_OUT: Final = re.compile(r"  ([xu]s)\[(\d+)\] = \(real\)(\w+);")
 Rows = list[list[float]]
 
 
@@ -45,124 +52,95 @@ def single(value: float) -> float:
     return float(struct.unpack("f", struct.pack("f", value))[0])
 
 
-@dataclass(frozen=True)
 class HeldPlan:
-    """The plan of a certificate, as a computer has it."""
+    """The plan of a certificate, as a computer has it: what is written of it in C, at which samples.
 
-    course: Course
+    After `steps` samples sample `after` is next: `steps` itself is the end. `lead`, s: from a sample to the u* that is
+    held for it. `formula`: the lines that set xs, and those that set us.
+    """
 
-    @property
-    def kind(self) -> str:
-        """How it is written in C: what goes on as it is, is a formula."""
-        course = self.course
-        if course.family is not None:
-            return "PLAN_HANDED"
-        goes_on = course.knots is None and course.curve.moves and course.spec.afterwards == "repeat"
-        return "PLAN_FORMULA" if goes_on else "PLAN_TABLE"
+    def __init__(self, course: Course, x: Sequence[str], u: Sequence[str]) -> None:
+        """`x` and `u` are texts of t, where the plan is given by such."""
+        spec, machine, self._course = course.spec, course.spec.hardware, course
+        horizon = spec.trajectory.horizon
+        self._goes_on = isinstance(spec.trajectory, Expressed) and spec.afterwards == "repeat"
+        self.kind = "PLAN_FORMULA" if self._goes_on else "PLAN_HANDED" if course.family else "PLAN_TABLE"
+        self.lead = machine.delay + (machine.sample_time / 2 if machine.hold == "middle" else 0)
+        self.steps, self.after = 1, 0
+        if self._goes_on:
+            self.steps = self.after = _EVER
+        elif horizon is not None:
+            self.steps = math.ceil(horizon / machine.sample_time) + (spec.afterwards == "rest")
+            self.after = {"nothing": self.steps, "rest": self.steps - 1, "repeat": 0}[spec.afterwards]
+        self.written = range(1 if course.family else self.steps)
+        self.formula, self._computed = ("", ""), list[list[Ball]]()
+        if self._goes_on:
+            self.written = range(0, 16 * _EVERY, _EVERY)
+            self._compute(x, u)
 
-    @property
-    def counts(self) -> tuple[int, int]:
-        """Samples of the plan, and which one comes after the last; the same number is the end."""
-        spec = self.course.spec
-        horizon, afterwards = spec.trajectory.horizon, spec.afterwards
-        count = 1 if horizon is None else ceil(horizon / spec.hardware.sample_time)
-        if self.kind == "PLAN_FORMULA":
-            return _EVER, _EVER
-        if self.kind == "PLAN_HANDED" or not self.course.curve.moves:
-            return (count, count) if horizon is not None and afterwards == "nothing" else (1, 0)
-        steps = count + (afterwards == "rest")
-        return steps, {"nothing": steps, "rest": steps - 1, "repeat": 0}[afterwards]
+    def _compute(self, x: Sequence[str], u: Sequence[str]) -> None:
+        """The formula, and what it gives where it is looked at."""
+        machine, rounds = self._course.spec.hardware, Ball(1, 2.0**-53)
+        with ctx.workprec(53):
+            now = [arb(float(machine.sample_time)) * k * rounds for k in _LOOKED_AT]
+            then = [(t + float(self.lead)) * rounds for t in now]
+            xs = [_in_c(ast.parse(text, mode="eval").body, now) for text in x]
+            us = [_in_c(ast.parse(text, mode="eval").body, then) for text in u]
+        self.formula = _lines("xs", xs), _lines("us", us)
+        self._computed = [list(row) for row in zip(*(values for _, values in (*xs, *us)), strict=True)]
+        if machine.arithmetic == "single":
+            self._computed = [[Ball(single(float(v.mid())), v.rad()) for v in row] for row in self._computed]
 
     def _at(self, t: Fraction) -> list[Ball]:
-        """x* and u* at a time, (n + m); where u* jumps, what it jumps to."""
-        curve, knots = self.course.curve, self.course.knots
+        """x* and u* at a time, (n + m); where u* jumps, what it jumps to; of a family 0."""
+        curve, knots, horizon = self._course.curve, self._course.knots, self._course.spec.trajectory.horizon
+        if self._course.family:
+            return [arb(0)] * (len(curve.x) + len(curve.u))
+        if horizon is not None and not self._goes_on:
+            t = t % horizon if self._course.spec.afterwards == "repeat" else min(t, horizon)
         if knots is None:
             return curve.field.at([exact(t)] if curve.field.variables else [])
         k = min(bisect_right(knots.t, t), len(curve.parts)) - 1
         return curve.field.with_values(curve.parts[k].values).at([exact(t - knots.t[k])])
 
-    def row(self, k: int) -> list[Ball]:
-        """x* and u* of sample k, (n + m)."""
-        machine, n = self.course.spec.hardware, len(self.course.curve.x)
-        lead = machine.delay + (machine.sample_time / 2 if machine.hold == "middle" else 0)
-        now, later = (self._during(k * machine.sample_time + more) for more in (Fraction(0), lead))
-        return [*self._at(now)[:n], *self._at(later)[n:]]
-
-    def _during(self, t: Fraction) -> Fraction:
-        horizon = self.course.spec.trajectory.horizon
-        if self.kind == "PLAN_FORMULA" or horizon is None:
-            return t
-        return t % horizon if self.course.spec.afterwards == "repeat" else min(t, horizon)
-
-    def agrees(self, text: str, period: float, read: Callable[[str], Rows]) -> tuple[str, list[float]]:
-        """What is wrong with the text of a plan, nothing if that is ""; and the largest |x*_i| that was seen, (n,)."""
-        n = len(self.course.curve.x)
-        if self.kind == "PLAN_FORMULA":
-            samples = [*range(_LOOKED_AT), *(2**j - 1 for j in range(9, 31))]
-            found = self._evaluated(text, samples, period)
-        else:
-            if (rows := _ROWS.fullmatch(text)) is None:
-                return "the plan is no table of x* and u*", []
-            samples = list(range(self.counts[0]))
-            pairs = zip(read(rows[1]), read(rows[2]), strict=True)
-            found = [[Ball(value) for value in (*x, *u)] for x, u in pairs if len(x) == n]
-        if len(found) != len(samples):
-            return "the plan does not have a row for every sample", []
+    def wrong(self, xs: Rows, us: Rows) -> str:
+        """What is wrong with rows of the samples that are written, or with the formula; nothing if that is ""."""
+        found = [*([Ball(v) for v in (*x, *u)] for x, u in zip(xs, us, strict=True)), *self._computed]
+        samples = [*self.written, *(_LOOKED_AT if self._goes_on else ())]
+        n, period = len(self._course.curve.x), self._course.spec.hardware.sample_time
         with ctx.workprec(128):
-            wanted = [self.row(k) for k in samples]
-        sizes = [max(floor(abs(row[i]).lower()) for row in wanted) for i in range(len(wanted[0]))]
-        most = [exact(_ACCURACY * Fraction(max(size, 0.0))) for size in sizes]
+            wanted = [[*self._at(k * period)[:n], *self._at(k * period + self.lead)[n:]] for k in samples]
+        sizes = [max(0.0, *(floor(x.abs_lower()) for x in column)) for column in zip(*wanted, strict=True)]
         for k, row, own in zip(samples, found, wanted, strict=True):
-            if len(row) != len(own) or not all(
-                abs(a - b) <= c for a, b, c in zip(row, own, most, strict=True)
-            ):
-                return f"the plan of sample {k} is not that of the certificate", []
-        return "", sizes[:n]
-
-    def _evaluated(self, text: str, samples: Sequence[int], period: float) -> list[list[Ball]]:
-        """What a formula in C gives at some samples; nothing if it is not what is written here for one.
-
-        In balls of 53 bits, whose operations lose no less than those of a double.
-        """
-        known: dict[str, Term] = {}
-        out: list[tuple[str, Term]] = []
-        late: dict[str, float] = {}
-        lines = text.split("\n")
-        for line in lines[2:-1]:
-            if said := _CLOCK.fullmatch(line):
-                late[said[1]], known[said[1]] = float.fromhex(said[2]), variable(said[1])
-            elif said := _LINE.fullmatch(line):
-                if (term := _term(said, known)) is None:
-                    return []
-                known[said[1]] = term
-            elif (said := _OUT.fullmatch(line)) and said[3] in known:
-                out.append((f"{said[1]}{said[2]}", known[said[3]]))
-            elif line not in ("  (void)t_xs;", "  (void)t_us;"):
-                return []
-        n, m = len(self.course.curve.x), len(self.course.curve.u)
-        order = [*(f"xs{i}" for i in range(n)), *(f"us{j}" for j in range(m))]
-        if [*lines[:2], lines[-1]] != ["#include <math.h>", _HEAD, "}"] or [name for name, _ in out] != order:
-            return []
-        with ctx.workprec(53):
-            program = Program([term for _, term in out], tuple(late))
-            clock, rounds = exact(Fraction(period)), Ball(1, 2.0**-53)
-            found = [
-                program.run([(clock * k * rounds + lag) * rounds for lag in late.values()]) for k in samples
-            ]
-        if self.course.spec.hardware.arithmetic == "double":
-            return found
-        return [[Ball(single(float(value.mid()))) for value in row] for row in found]
+            near = zip(row, own, sizes, strict=True)
+            if not all(abs(a - b) <= size * _ACCURACY for a, b, size in near):
+                return f"the plan of sample {k} is not that of the certificate"
+        return ""
 
 
-def _term(line: re.Match[str], known: dict[str, Term]) -> Term | None:
-    """The right side of a line, of what is known above it."""
-    _, literal, left, sign, right, base, power, function, argument = line.groups()
-    if literal is not None:
-        return number(Fraction(float.fromhex(literal)))
-    used = [name for name in (left, right, base, argument) if name is not None]
-    if any(name not in known for name in used):
-        return None
-    if sign is not None:
-        a, b = known[left], known[right]
-        return a + b if sign == "+" else a * b if sign == "*" else a / b
-    return known[base].raised(int(power)) if base is not None else operation(function, known[argument])
+def _lines(name: str, said: Sequence[tuple[str, list[Ball]]]) -> str:
+    return "\n".join(f"  {name}[{i}] = (real){text};" for i, (text, _) in enumerate(said))
+
+
+def _in_c(node: ast.expr, t: list[Ball]) -> tuple[str, list[Ball]]:
+    """An expression of t in C, and its values at some t, in balls of 53 bits: a double loses no more."""
+    match node:
+        case ast.Name(id="t"):
+            return "t", t
+        case ast.Name(id="pi"):
+            return math.pi.hex(), [arb(math.pi)] * len(t)
+        case ast.Constant(value=int() | float() as value):
+            return float(value).hex(), [arb(float(value))] * len(t)
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            text, x = _in_c(inner, t)
+            return f"(-{text})", [-v for v in x]
+        case ast.BinOp(left=base, op=ast.Pow(), right=exponent):
+            (text, x), n = _in_c(base, t), ast.literal_eval(exponent)
+            return f"pow({text}, {_in_c(exponent, t)[0]})", [power(v, n) for v in x]
+        case ast.BinOp(left=left, op=op, right=right) if sign := _SIGNS.get(type(op)):
+            (a, x), (b, y) = _in_c(left, t), _in_c(right, t)
+            return f"({a} {sign} {b})", list(map(_APPLIED[sign], x, y))
+        case ast.Call(func=ast.Name(id=name), args=[argument]) if name in _FUNCTIONS:
+            (text, x), program = _in_c(argument, t), Program([operation(name, variable("t"))], ("t",))
+            return f"{name}({text})", [program.run([v])[0] for v in x]
+    raise ValueError(f"{ast.unparse(node)[:60]} in the plan")
