@@ -1,7 +1,6 @@
 """The inequalities of the sampled loop against closed forms: one term at a time, never below, and at most 1 % above.
 
 Mostly x' = u at Ts = .1 under delta = -e/Ts, which forgets within a sample, so that a bound is what one sample does.
-`PIECE`: with what acts within a sample up to the end of a piece, of two.
 """
 
 from dataclasses import replace
@@ -24,7 +23,7 @@ from tubecert.spec import Knots, load_text
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import piecewise_plan
 
-TS, PIECE = 0.1, 1.5
+TS = 0.1
 POINT = "{kind: equilibrium, at: [0], input: [0]}"
 WAVE = "{kind: expressions, x: ['sin(t)'], u: ['cos(t)'], horizon: 7, afterwards: repeat}"
 HOME = {
@@ -121,20 +120,20 @@ def test_noise_by_components_and_by_length(noise, both):
 
 def test_wind():
     found = bounds(loop_of(disturbance="{E: [[1]], bound: 0.3}"))
-    close(found.W, 0.3 * TS * PIECE)
+    close(found.W, 0.3 * TS)
     close(found.U, 0.3)
 
 
 def test_wind_of_a_length_is_less_than_that_of_its_components():
     E = "[['0.6', '0.8']]"
     for bound, size in (("0.5", 0.5), ("[0.5, 0.5]", 0.7)):
-        close(bounds(loop_of(disturbance=f"{{E: {E}, bound: {bound}}}", E=[[0.6, 0.8]])).W, size * TS * PIECE)
+        close(bounds(loop_of(disturbance=f"{{E: {E}, bound: {bound}}}", E=[[0.6, 0.8]])).W, size * TS)
 
 
 def test_wind_with_a_rate_counts_by_its_rate():
     loop = loop_of(disturbance="{E: [[1]], bound: 9, rate: 0.4}")
     found = bounds(loop, tables=controller_of(**OBSERVER), starts=(0, 6), lags=40)
-    close(found.W[1], 0.4 * TS**2 * (0.75 + 0.5))
+    close(found.W[1], 0.4 * TS**2 + 0.4 * (TS / 2) ** 2 / 8)
 
 
 def test_wind_with_a_rate_is_cut():
@@ -179,7 +178,7 @@ def test_a_start_has_signs_a_box_has_none_and_a_ball_its_length():
 def test_tail():
     """e_(k+1) = e_k/2 + what wind adds: three lags, and an eighth of the box."""
     loop = loop_of(disturbance="{E: [[1]], bound: 0.3}")
-    close(bounds(loop, W=0.8, tables=controller_of([[-5]]), lags=3).W, 1.75 * 0.03 + 0.1 + 0.015)
+    close(bounds(loop, W=0.8, tables=controller_of([[-5]]), lags=3).W, 1.75 * 0.03 + 0.1)
 
 
 def test_how_a_plan_s_input_is_held():
@@ -187,7 +186,7 @@ def test_how_a_plan_s_input_is_held():
         loop = loop_of(trajectory=WAVE, hardware=f"{{sample_time: 0.1, hold: {hold}}}")
         close(Remainders(loop, 256).held, error)
         if hold != "continuous":
-            close(bounds(loop, windows=256).W, error * TS * PIECE)
+            close(bounds(loop, windows=256).W, error * TS)
 
 
 def test_inputs_that_jump_across_the_end_of_a_plan_that_repeats():
@@ -263,7 +262,7 @@ def test_rounding_of_singles():
     found = bounds(loop, W=2.0, tables=controller_of([[-10]]))
     defect = 5  # x' = u, at rest under 5
     y, u = unit * 1000 + 2 * unit * 2002, 4 * unit * 25
-    close(found.W, (y + TS * u) + (defect + 5 * unit) * TS * PIECE)
+    close(found.W, (y + TS * u) + (defect + 5 * unit) * TS)
     close(found.U, [defect + (2 * y + TS * u) / TS + u])
 
 
@@ -394,8 +393,8 @@ def test_chords_meet_the_box_and_noise():
     loop = loop_of(**{**DOUBLE, "hardware": machine}, A=[[0, 1], [0, 0]], B=[[0], [1]])
     own = asked(loop, controller_of([[-3, -4]]), pieces=1)
     boxes = Boxes(np.array([[0.5, 0.7]]), np.array([[9.0]]), np.zeros((1, 0)))
-    (phase,), _ = own.phases(boxes)
-    close(own._between(phase, np.zeros(3)), [[(3 * 0.51 + 4 * 0.72) * TS**2 / 8, 1e-30]])
+    (phase,), sizes = own.phases(boxes)
+    close(own._between(phase, np.zeros(3), sizes), [[(3 * 0.51 + 4 * 0.72) * TS**2 / 8, 1e-30]])
 
 
 def test_what_was_sent_in_a_stage_is_met_in_the_next():
