@@ -14,11 +14,11 @@ from scipy.linalg import expm
 
 from tubecert.model import build
 from tubecert.sampled_loop.cells import largest_jump, steepness
-from tubecert.sampled_loop.record import Recipe
+from tubecert.sampled_loop.record import Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Dynamics, Kernel, Responses
 from tubecert.sampled_loop.setting import Controller, Loop
-from tubecert.sampled_loop.theorem import Boxes, Inequalities
+from tubecert.sampled_loop.theorem import Boxes, Inequalities, check
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import piecewise_plan
@@ -250,20 +250,25 @@ def test_what_is_left_acts_as_a_wind_does_through_its_columns():
 
 
 def test_rounding_of_singles():
-    """x* = 1000: y, dy and what is sent, one unit of 2^-24 each, and the plan itself."""
+    """x* = 1000, W = 2, noise 3: y, dy and what is sent, one unit of 2^-24 each, and the plan itself."""
     at = {"trajectory": "{kind: equilibrium, at: [1000], input: [5]}", "initial_state": "{at: [1000]}"}
-    loop = loop_of(**at, system=scalar(), hardware="{sample_time: 0.1, arithmetic: single}")
-    off = asked(loop)._rounding(Boxes(np.full((1, 1), 2.0), np.zeros((1, 1)), np.zeros((1, 0))))
+    loop = loop_of(**at, hardware="{sample_time: 0.1, arithmetic: single, noise: {x: 3}}")
+    boxes = Boxes(np.full((1, 1), 2.0), np.zeros((1, 1)), np.full((1, 1), 9.0))
     unit = 2**-24
-    close(off, [unit * 1000 + 2 * unit * 2002, 4 * unit * (5 + 5 * unit + 10 * 2)], 1e-3)
-    own = asked(loop, controller_of([[-10]], [[0.5]], [[3]], [[7]]))
-    off = own._rounding(Boxes(np.full((1, 1), 2.0), np.zeros((1, 1)), np.full((1, 1), 9.0)))
-    close(off[1:], [5 * unit * (5 + 7 * 9 + 10 * 2), 5 * unit * (0.5 * 9 + 3 * 2)], 1e-3)
-    found = bounds(loop, W=2.0, tables=controller_of([[-10]]))
-    defect = 5  # x' = u, at rest under 5
+    y = unit * 1000 + 2 * unit * 2005
+    off = asked(loop)._rounding(replace(boxes, Z=np.zeros((1, 0))))
+    close(off, [y, 4 * unit * (5 + 5 * unit + 10 * 5)], 1e-3)
+    off = asked(loop, controller_of([[-10]], [[0.5]], [[3]], [[7]]))._rounding(boxes)
+    close(off, [y, 5 * unit * (5 + 7 * 9 + 10 * 5), 5 * unit * (0.5 * 9 + 3 * 5)], 1e-3)
+    still = loop_of(**at, hardware="{sample_time: 0.1, arithmetic: single}")
+    found, held = bounds(still, W=2.0), 5 * (1 + unit)  # x' = u, at rest under 5: a defect
     y, u = unit * 1000 + 2 * unit * 2002, 4 * unit * 25
-    close(found.W, (y + TS * u) + (defect + 5 * unit) * TS)
-    close(found.U, [defect + (2 * y + TS * u) / TS + u])
+    assert y + TS * u + held * TS - 1e-9 <= found.W[0, 0] <= (y + TS * u + held * TS) * 1.0001
+    assert (
+        (2 * y + TS * u + held * TS) / TS + u - 2e-6
+        <= found.U[0, 0]
+        <= ((2 * y + TS * u + held * TS) / TS + u) * 1.0001
+    )
 
 
 @pytest.mark.parametrize("whole", [0, 1, 2])
@@ -393,8 +398,18 @@ def test_chords_meet_the_box_and_noise():
     loop = loop_of(**{**DOUBLE, "hardware": machine}, A=[[0, 1], [0, 0]], B=[[0], [1]])
     own = asked(loop, controller_of([[-3, -4]]), pieces=1)
     boxes = Boxes(np.array([[0.5, 0.7]]), np.array([[9.0]]), np.zeros((1, 0)))
-    (phase,), sizes = own.phases(boxes)
-    close(own._between(phase, np.zeros(3), sizes), [[(3 * 0.51 + 4 * 0.72) * TS**2 / 8, 1e-30]])
+    (phase,), _ = own.phases(boxes)
+    off = np.array([0.1, 0.2, 0.4])
+    close(own._between(phase, off), [[(3 * 0.61 + 4 * 0.92 + 0.4) * TS**2 / 8, 1e-30]])
+
+
+def test_a_stage_begins_before_the_plan_ends():
+    loop = loop_of(trajectory=WAVE.replace("repeat", "nothing").replace("horizon: 7", "horizon: 1.01"))
+    recipe = asked(loop, lags=4).recipe
+    stage = Stage(start=0, half_widths={"x": Fraction(1)}, deviations={"u": Fraction(9)}, memory=())
+    for starts, verdict in (((0,), "certified"), ((0, 10), "certified"), ((0, 11), "undecided")):
+        stages = [replace(stage, start=k) for k in starts]
+        assert check(loop, controller_of(), stages, recipe).verdict.value == verdict
 
 
 def test_what_was_sent_in_a_stage_is_met_in_the_next():

@@ -1,21 +1,29 @@
 """The sums of the checker against the worst that signals do: an oracle in floats that shares nothing with it."""
 
+import json
 from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from flint import arb, arb_mat, ctx
+from sampled_files import SCALAR
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
+from tubecert.recheck.document import Node
 from tubecert.recheck.obstacles import Obstacle
+from tubecert.recheck.plans import Plan
 from tubecert.recheck.sampled_loop.conditions import Inequalities, phases_of
 from tubecert.recheck.sampled_loop.exponential import flow
 from tubecert.recheck.sampled_loop.loop import Loop
 from tubecert.recheck.sampled_loop.obstacles import _apart
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.rows import Ground, Problem, Signals, Start
+from tubecert.recheck.sampled_loop.windows import course_of
+from tubecert.recheck.specification import read_sampled_specification
+from tubecert.spec import load_text
+from tubecert.spec.canonical import canonical
 
 FINE = 12  # parts of a sample, of which whole numbers are late
 SAMPLE = Fraction(1, 4)
@@ -212,3 +220,17 @@ def test_a_box_keeps_away_from_a_polygon_by_an_axis_or_by_a_line():
     ):
         box = [(Fraction(x), Fraction(x) + Fraction(3, 4)), (Fraction(y) + Fraction(1, 2), Fraction(y) + 1)]
         assert _apart(polygon, box) is apart, (x, y)
+
+
+def test_a_plan_of_a_family_moves_as_the_plant_does_and_by_its_defect():
+    text = SCALAR.replace(
+        "{kind: equilibrium, at: [0], input: [0]}",
+        "{kind: any, x: {x: [-1, 1]}, u: {u: [-2, 2]}, defect: 0.25, input_rate: 3}",
+    ).replace("{at: [0.3]}", "{within: 0.1}")
+    spec = read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
+    course = course_of(spec, Plan("any", None, None, None, None, None))
+    (window,) = course.windows(1)
+    assert window.speed[0].contains(arb(0, "2.75"))
+    assert window.steepness[0].contains(arb(0, 3))
+    assert course.held([window])[0] >= arb("0.15").lower()
+    assert course.defect(1)[0].contains(arb("0.25"))
