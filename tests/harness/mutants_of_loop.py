@@ -5,7 +5,7 @@
 
 A mutant is one place of the code with another comparison, sign, factor, number, choice of max or min, or a term less.
 It is killed if a certificate that holds is no longer certified or confirmed (a tube is .1 % wider than the least one, so
-that bounds that are merely larger are killed as well), if a forged one is, or if one of the fast tests fails.
+bounds that are merely larger are killed as well), if a forged one is, or if one of the fast tests fails.
 """
 
 import argparse
