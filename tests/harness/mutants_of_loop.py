@@ -4,7 +4,7 @@
     python tests/harness/mutants_of_loop.py recheck --count 200 --seed 34
 
 A mutant is one place of the code with another comparison, sign, factor, number, choice of max or min, or a term less.
-It is killed if a certificate that holds is no longer certified or confirmed (a tube is .1 % wider than the least one, so
+It is killed if a certificate that holds is no longer certified or confirmed (a tube is .1 % wider than the least, so
 bounds that are merely larger are killed as well), if a forged one is, or if one of the fast tests fails.
 """
 

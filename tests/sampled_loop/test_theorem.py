@@ -253,10 +253,10 @@ def test_rounding_of_singles():
     """x* = 1000, W = 2, noise 3: y, dy and what is sent, one unit of 2^-24 each, and the plan itself."""
     at = {"trajectory": "{kind: equilibrium, at: [1000], input: [5]}", "initial_state": "{at: [1000]}"}
     loop = loop_of(**at, hardware="{sample_time: 0.1, arithmetic: single, noise: {x: 3}}")
-    boxes = Boxes(np.full((1, 1), 2.0), np.zeros((1, 1)), np.full((1, 1), 9.0))
+    boxes = Boxes(np.array([[2.0], [0.1]]), np.zeros((2, 1)), np.array([[3.0], [9.0]]))
     unit = 2**-24
     y = unit * 1000 + 2 * unit * 2005
-    off = asked(loop)._rounding(replace(boxes, Z=np.zeros((1, 0))))
+    off = asked(loop)._rounding(replace(boxes, Z=np.zeros((2, 0))))
     close(off, [y, 4 * unit * (5 + 5 * unit + 10 * 5)], 1e-3)
     off = asked(loop, controller_of([[-10]], [[0.5]], [[3]], [[7]]))._rounding(boxes)
     close(off, [y, 5 * unit * (5 + 7 * 9 + 10 * 5), 5 * unit * (0.5 * 9 + 3 * 5)], 1e-3)
