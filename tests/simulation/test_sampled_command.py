@@ -46,6 +46,9 @@ def test_the_same_from_code_of_a_family(files):
     assert "<SampledSimulation: not falsified pendulum" in repr(found)
     assert "largest share" in found._repr_html_()
     assert found.figure("plane").axes
+    names = found.save("a")
+    assert found.save("b") == names
+    assert all((files / "a" / name).read_bytes() == (files / "b" / name).read_bytes() for name in names)
 
 
 def test_data_on_stdout_and_the_certificate_of_another_system(files):
