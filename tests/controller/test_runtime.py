@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 from fractions import Fraction
-from pathlib import Path
 
 import handmade
 import numpy as np
@@ -14,16 +13,12 @@ from hypothesis import strategies as st
 from tubecert.controller.compiled import Controller, build
 from tubecert.controller.data import HOME, data_of
 from tubecert.controller.folder import files_of, write
-from tubecert.errors import ExitCode, TubecertError
-from tubecert.sampled_loop.record import Lack
-from tubecert.verdict import Verdict
+from tubecert.errors import TubecertError
 
 BAD, END, CLIPPED = 1, 2, 4
 WAVE = handmade.WAVE % ""
-MOVING = [
-    (WAVE, "nothing"),
-    (handmade.WAVE % ", afterwards: rest", "rest"),
-    (handmade.WAVE % ", afterwards: repeat", "repeat"),
+MOVING = [(WAVE, "nothing")] + [
+    (handmade.WAVE % f", afterwards: {word}", word) for word in ("rest", "repeat")
 ]
 PLANS = [(handmade.REST, "nothing"), *MOVING, (handmade.ANY, "nothing")]
 
@@ -32,18 +27,18 @@ def loop(trajectory=handmade.REST, lanes=1, **options):
     return Controller(data_of(handmade.certificate(trajectory, **options)), lanes)
 
 
-def feedforward(trajectory=handmade.REST, **options):
+def feedforward(**options):
     """A controller that hands out the plan's input."""
     tables = handmade.tables(1)
     tables.M.value[:] = 0
     tables.N.value[:] = [[1e-30, 0]]  # some controller
-    return loop(trajectory, z=1, controller=tables, **options)
+    return loop(z=1, controller=tables, **options)
 
 
 def shipped(folder, **options):
     """The files of a certificate in a folder of their own."""
     write(str(folder), files_of(data_of(handmade.certificate(**options))))
-    return Path(folder)
+    return folder
 
 
 def product(data, names, seen):
@@ -58,7 +53,7 @@ def product(data, names, seen):
     z=st.integers(0, 4),
     seed=st.integers(0, 99),
     single=st.booleans(),
-    parts=st.lists(st.lists(st.floats(-1, 1), min_size=2, max_size=2), min_size=1, max_size=6),
+    parts=st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=6),
 )
 @settings(max_examples=15, deadline=None)
 def test_steps_are_exact_but_for_rounding(z, seed, single, parts):
@@ -90,24 +85,21 @@ def u_star(t):
 @pytest.mark.parametrize(("trajectory", "afterwards"), MOVING)
 def test_the_plan_is_taken_when_its_command_acts(trajectory, afterwards, hold):
     """x* at t_k; u* at the middle or the beginning of [t_k + delay, t_k + delay + Ts): not at t_k."""
-    own = feedforward(trajectory, afterwards=afterwards, hold=hold)
+    own = feedforward(trajectory=trajectory, afterwards=afterwards, hold=hold)
     later = 0.005 + (0.01 if hold == "middle" else 0)
-
-    def during(t):
-        return t if afterwards == "repeat" else min(t, 1.01)
-
+    last = np.inf if afterwards == "repeat" else 1.01
     for k in range(60):
-        t = during(k * 0.02)
+        t = min(k * 0.02, last)
         [[u]] = own.step(np.array([np.sin(t), np.cos(t)]))
         row = min(k, 50) if afterwards == "nothing" else k
-        assert u == pytest.approx(u_star(during(row * 0.02 + later)), rel=1e-7, abs=1e-7)
-        assert own.state["status"][0] == (END if afterwards == "nothing" and k > 50 else 0)
+        assert u == pytest.approx(u_star(min(row * 0.02 + later, last)), rel=1e-7, abs=1e-7)
+        assert own.state["status"] == (END if afterwards == "nothing" and k > 50 else 0)
     assert u_star(1) != pytest.approx(u_star(1 + later), abs=1e-3)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("afterwards", "steps", "then"), [("repeat", 10, 1.0), ("rest", 11, 2.0), ("nothing", 10, 2.0)]
+    ("afterwards", "steps", "then"), [("repeat", 10, 1), ("rest", 11, 2), ("nothing", 10, 2)]
 )
 def test_where_the_input_jumps_it_is_taken_from_its_interval(afterwards, steps, then):
     """Command 4 acts over [.085, .105), whose middle is before the jump; command 5 over [.105, .125).
@@ -116,10 +108,10 @@ def test_where_the_input_jumps_it_is_taken_from_its_interval(afterwards, steps, 
     """
     own = feedforward(planned=handmade.held_knots(), afterwards=afterwards)
     assert own.data.plan.steps == steps
-    rows = own.data.plan.at(range(steps))[0]
+    rows = own.data.plan.rows[0]
     order = [*range(10), *(range(5) if afterwards == "repeat" else [steps - 1] * 5)]
-    assert [own.step(rows[row])[0, 0] for row in order] == [1.0] * 5 + [2.0] * 5 + [then] * 5
-    assert own.state["bad"][0] == 0
+    assert [own.step(rows[row])[0, 0] for row in order] == [1] * 5 + [2] * 5 + [then] * 5
+    assert own.state["bad"] == 0
 
 
 @pytest.mark.slow
@@ -129,7 +121,7 @@ def test_a_bad_sample_holds_and_is_told_while_it_lasts(arithmetic):
     [x], _ = own.data.plan.at([0])
     for bad in (np.nan, np.inf, -np.inf, 1e300, x[0] + own.data.limits["reach"][0] * 1.001):
         good, kept = own.step(x + 0.1), own.state.copy()
-        assert own.state["status"].tolist() == [0, 0, 0], "afterwards it goes on"
+        assert not own.state["status"].any(), "afterwards it goes on"
         for _ in range(3 if not np.isfinite(bad) else 1):
             with np.errstate(over="ignore"):
                 found = own.step(np.where([[False, False], [True, False], [False, False]], bad, x))
@@ -147,13 +139,10 @@ def test_what_stays_far_away_is_no_glitch_and_steered_against():
     for own in (far, edge):
         held = own.step(np.array([p, v]))
         assert own.step(np.array([70.0, 0.1])) == held, "the first one"
+    most = np.array([p + 64 * far.data.limits["reach"][0], 0.1])
     for _ in range(3):
-        assert (
-            far.step(np.array([70.0, 0.1]))
-            == edge.step(np.array([p + 64 * far.data.limits["reach"][0], 0.1]))
-            != held
-        )
-        assert far.state["status"][0] & BAD
+        assert far.step(np.array([70.0, 0.1])) == edge.step(most) != held
+        assert far.state["status"] & BAD
         assert (far.state["zeta"] == edge.state["zeta"]).all()
     far.step(np.array([np.nan, 0]))
     assert (far.state["zeta"] == edge.state["zeta"]).all(), "what is not finite is held, always"
@@ -163,9 +152,9 @@ def test_what_stays_far_away_is_no_glitch_and_steered_against():
 def test_time_goes_on_while_samples_are_bad():
     own = loop(WAVE)
     found = [own.step(np.array([np.nan, 0.0]))[0, 0] for _ in range(55)]
-    wanted = own.data.plan.at(range(51))[1][:, 0].tolist()
+    wanted = own.data.plan.rows[1][:, 0].tolist()
     assert found == wanted + wanted[-1:] * 4, "the correction is 0: the plan's input, and its last"
-    assert (own.state["bad"][0], own.state["status"][0]) == (51, END)
+    assert (own.state["bad"], own.state["status"]) == (51, END)
 
 
 @pytest.mark.slow
@@ -175,8 +164,6 @@ def test_a_family_is_handed_its_plan():
     assert own.step(xs, xs, us).tolist() == us.tolist()
     assert own.step(np.zeros(2), xs, us).shape == (2, 1)
     assert own.state["status"].tolist() == [BAD, 0], "compared with the plan that is handed in"
-    with pytest.raises(ValueError, match="zip"):
-        own.step(xs)
 
 
 @pytest.mark.slow
@@ -187,7 +174,7 @@ def test_inputs_stay_in_the_range_and_a_limit_that_acts_is_told():
     [x], _ = own.data.plan.at([0])
     for side, limit in ((1, Fraction("3.3")), (-1, Fraction("-3.1"))):
         [[u]] = own.step(x + np.array([0.2 * side, 0.0]))
-        assert own.state["status"][0] == CLIPPED
+        assert own.state["status"] == CLIPPED
         beyond = np.nextafter(u, np.inf * side)
         assert Fraction(u) * side <= limit * side < Fraction(float(beyond)) * side
 
@@ -198,27 +185,26 @@ def test_inputs_stay_in_the_range_and_a_limit_that_acts_is_told():
 def test_the_self_test_passes_and_notices_a_wrong_step_or_plan(tmp_path, trajectory, afterwards, arithmetic):
     folder = shipped(tmp_path / "a b", trajectory=trajectory, afterwards=afterwards, arithmetic=arithmetic)
 
-    def tested():
+    def wrong():
         build(folder, ["controller.c", "selftest.c", "-o", "selftest"])
-        return subprocess.run([folder / "selftest"], capture_output=True, text=True, check=False)
+        return subprocess.run([folder / "selftest"], capture_output=True, check=False).returncode
 
-    assert tested().returncode == 0, tested().stdout
+    assert wrong() == 0
     changes = [("controller.c", "sum += G[i][j] * dy[j]", "sum += G[i][j] * dy[0]")]
     if afterwards == "repeat":
         changes.append(("controller_data.h", "sin(t)", "sin(t * 1.0000001)"))
     for name, old, new in changes:
         right = (folder / name).read_text()
         (folder / name).write_text(right.replace(old, new, 1))
-        assert tested().returncode == 1, name
+        assert wrong() == 1, name
         (folder / name).write_text(right)
 
 
 @pytest.mark.slow
-def test_fast_math_is_refused(tmp_path):
-    folder = shipped(tmp_path / "c")
-    for flag in ("-ffast-math", "-ffinite-math-only"):
-        with pytest.raises(TubecertError, match="removes the test"):
-            build(folder, [flag, "-c", "controller.c"])
+@pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only"])
+def test_fast_math_is_refused(tmp_path, flag):
+    with pytest.raises(TubecertError, match="removes the test"):
+        build(shipped(tmp_path / "c"), [flag, "-c", "controller.c"])
 
 
 ATTACK = """
@@ -257,33 +243,13 @@ def test_a_million_samples_of_which_some_are_bad(tmp_path, arithmetic):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_the_runtime_is_short():
+@pytest.mark.slow
+def test_the_runtime_is_short_and_files_are_the_same_every_time():
     assert (
         sum(len((HOME / name).read_text().splitlines()) for name in ("controller.c", "controller.h")) <= 120
     )
-
-
-@pytest.mark.slow
-def test_files_are_the_same_every_time():
     one, other = (files_of(data_of(handmade.certificate(WAVE))) for _ in range(2))
     assert one == other
-
-
-@pytest.mark.parametrize(
-    ("changes", "code"),
-    [
-        ({"verdict": Verdict.UNDECIDED, "lacks": (Lack(kind="no_design"),)}, ExitCode.UNDECIDED),
-        ({"verdict": Verdict.REFUTED}, ExitCode.NOT_CERTIFIED),
-        ({"z": 0}, ExitCode.INVALID),
-    ],
-)
-def test_what_is_not_certified_or_has_no_controller_is_refused(changes, code):
-    own = handmade.certificate(**changes)
-    own.result.controller.N.value[:] = 0
-    with pytest.raises(TubecertError) as caught:
-        data_of(own)
-    assert caught.value.exit_code is code
-    assert caught.value.findings[0].help
 
 
 def test_without_a_compiler_the_remedy_is_told(monkeypatch):

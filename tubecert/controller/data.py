@@ -22,7 +22,7 @@ from tubecert.verdict import Verdict
 
 HOME: Final = Path(__file__).parent
 _OWN: Final = ("controller_data.h", "README.txt")
-_ROUNDING: Final = Fraction(1, 2**21)  # of |x| and a width: more than rounding adds to a sample that is right
+_ROUNDING: Final = Fraction(1, 2**21)  # of |x| and a width: more than rounding makes of a sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,16 +106,9 @@ def texts(data: Data) -> dict[str, str]:
         **{name: _row(own.tolist()) for name, own in data.limits.items()},
         **{"name": data.name, "hash": data.hash, "n": n, "m": m, "z": z, "work": data.work},
         **{"period": float(data.sample_time), "delay": float(data.delay), "lead": float(plan.lead)},
-        **{
-            "kind": plan.kind,
-            "steps": plan.steps,
-            "after": plan.after,
-            "rows": len(plan.rows[0]),
-            "every": plan.every,
-        },
+        **{"kind": plan.kind, "steps": plan.steps, "after": plan.after, "rows": len(plan.rows[0])},
+        **{"formula_x": plan.formula[0], "formula_u": plan.formula[1]},
         "real": "float" if data.real is np.float32 else "double",
-        "formula_x": plan.formula[0],
-        "formula_u": plan.formula[1],
         "handed": "xs, us, " if plan.at is None else "",
         "end": over if plan.after == plan.steps else "never",
     }

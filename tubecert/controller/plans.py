@@ -31,7 +31,7 @@ from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 from tubecert.trajectory.plan import Plan
 
 _FOR_EVER: Final = 2**30  # samples of a formula: up to there its time in double is that of the sample
-_EVERY: Final = 4096  # of them one in the self-test
+_EVERY: Final = 4096  # of them one in the self-test: as in selftest.c
 _MOST_ROWS: Final = 1_000_000
 _SIGNS: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 At: TypeAlias = Callable[[Sequence[int]], tuple[Array, Array]]
@@ -43,7 +43,7 @@ class Planned:
 
     After `steps` samples sample `after` is next: `steps` itself is the end. `lead`, s: from a sample to the u* that is
     held for it. `at` is the plan of some samples, (N, n) and (N, m), None where it is handed in; `rows` is that of all
-    samples, of a formula that of one of `every`, of a family 0. `formula`: lines of C that set xs, and those for us.
+    samples, of a formula that of some, of a family 0. `formula`: lines of C that set xs, and those for us.
     """
 
     kind: str
@@ -52,7 +52,6 @@ class Planned:
     lead: Fraction
     rows: tuple[Array, Array]
     at: At | None
-    every: int = 1
     formula: tuple[str, str] = ("", "")
 
 
@@ -103,7 +102,7 @@ def planned(result: Result, spec: Spec) -> Planned:
         rows = at(range(0, 16 * _EVERY, _EVERY))
         own = result.spec.effective.part("trajectory")
         formula = _formula("xs", own["x"]), _formula("us", own["u"])
-        return Planned("PLAN_FORMULA", steps, after, lead, rows, at, _EVERY, formula)
+        return Planned("PLAN_FORMULA", steps, after, lead, rows, at, formula)
     return Planned("PLAN_TABLE", steps, after, lead, at(range(steps)), at)
 
 

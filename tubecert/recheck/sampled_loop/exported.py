@@ -26,9 +26,7 @@ from tubecert.recheck.sampled_loop.windows import course_of
 _SHIPPED: Final = Path(__file__).parents[2] / "controller"
 _DATA, _README = "controller_data.h", "README.txt"
 _RUNTIME: Final = ("controller.c", "controller.h", "selftest.c")
-_ROUNDING: Final = Fraction(
-    1, 2**21
-)  # of a reach and of |x|: more than rounding adds to a sample that is right
+_ROUNDING: Final = Fraction(1, 2**21)  # of |x| and a width: more than rounding makes of a sample
 _PLAN: Final = re.compile(r"XS\[ROWS\]\[NX\] = ([^;]*);.*\n.* US\[ROWS\]\[NU\] = ([^;]*);")
 
 
@@ -54,13 +52,13 @@ def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, 
     if why:
         return
     result, texts = certificate.result, document.value["result"]["spec"]["effective"]["trajectory"]
-    held = HeldPlan(course_of(result.specification, result.plan), texts.get("x", ()), texts.get("u", ()))
     try:
+        held = HeldPlan(course_of(result.specification, result.plan), texts.get("x", ()), texts.get("u", ()))
         found = _PLAN.search(files[_DATA].decode("ascii"))
         xs, us = map(_rows, found.groups() if found else ())
         same = files[_DATA] == _marked(_data(certificate, held, xs, us).encode())
         why = held.wrong(xs, us) if same else f"{_DATA} is not what tubecert writes for it"
-    except (ValueError, OverflowError) as error:
+    except (ValueError, OverflowError, KeyError) as error:
         same, why = False, f"{_DATA} is not as tubecert writes it ({error})"
     yield "controller: the data are those of the certificate, digit for digit", stated(same, why)
     if same:
@@ -101,14 +99,8 @@ def _data(certificate: Certificate, held: HeldPlan, xs: Rows, us: Rows) -> str:
         **{name: _array(own) for name, own in _limits(result, proven).items()},
         **{"n": len(plant.states), "m": len(plant.inputs), "z": len(proven.tables.F)},
         **{"period": float(machine.sample_time), "delay": float(machine.delay), "lead": float(held.lead)},
-        **{
-            "steps": held.steps,
-            "after": held.after,
-            "rows": len(held.written),
-            "every": held.written.step,
-            "kind": held.kind,
-        },
-        **{"formula_x": held.formula[0], "formula_u": held.formula[1], "hash": certificate.hash},
+        **{"kind": held.kind, "steps": held.steps, "after": held.after, "hash": certificate.hash},
+        **{"rows": len(held.written), "formula_x": held.formula[0], "formula_u": held.formula[1]},
         "real": "float" if machine.arithmetic == "single" else "double",
     }
     return Template((_SHIPPED / f"{_DATA}.in").read_text("utf-8")).substitute(places)

@@ -30,20 +30,6 @@ _EVERY: Final = 4096  # ... of them one for the self-test,
 _LOOKED_AT: Final = (*range(256), *(2**j - 1 for j in range(9, 31)))  # ... and of them here
 _SIGNS: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _APPLIED: Final = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
-_FUNCTIONS: Final = (
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "exp",
-    "log",
-    "sqrt",
-)
 Rows = list[list[float]]
 
 
@@ -61,24 +47,22 @@ class HeldPlan:
 
     def __init__(self, course: Course, x: Sequence[str], u: Sequence[str]) -> None:
         """`x` and `u` are texts of t, where the plan is given by such."""
-        spec, machine, self._course = course.spec, course.spec.hardware, course
-        horizon = spec.trajectory.horizon
+        self._course, spec, machine = course, course.spec, course.spec.hardware
         self._goes_on = isinstance(spec.trajectory, Expressed) and spec.afterwards == "repeat"
         self.kind = "PLAN_FORMULA" if self._goes_on else "PLAN_HANDED" if course.family else "PLAN_TABLE"
         self.lead = machine.delay + (machine.sample_time / 2 if machine.hold == "middle" else 0)
         self.steps, self.after = 1, 0
         if self._goes_on:
             self.steps = self.after = _EVER
-        elif horizon is not None:
+        elif (horizon := spec.trajectory.horizon) is not None:
             self.steps = math.ceil(horizon / machine.sample_time) + (spec.afterwards == "rest")
             self.after = {"nothing": self.steps, "rest": self.steps - 1, "repeat": 0}[spec.afterwards]
-        self.written = range(1 if course.family else self.steps)
-        self.formula, self._computed = ("", ""), list[list[Ball]]()
-        if self._goes_on:
-            self.written = range(0, 16 * _EVERY, _EVERY)
-            self._compute(x, u)
+        self.written = (
+            range(0, 16 * _EVERY, _EVERY) if self._goes_on else range(1 if course.family else self.steps)
+        )
+        self.formula, self._computed = self._compute(x, u) if self._goes_on else (("", ""), [])
 
-    def _compute(self, x: Sequence[str], u: Sequence[str]) -> None:
+    def _compute(self, x: Sequence[str], u: Sequence[str]) -> tuple[tuple[str, str], list[list[Ball]]]:
         """The formula, and what it gives where it is looked at."""
         machine, rounds = self._course.spec.hardware, Ball(1, 2.0**-53)
         with ctx.workprec(53):
@@ -86,10 +70,10 @@ class HeldPlan:
             then = [(t + float(self.lead)) * rounds for t in now]
             xs = [_in_c(ast.parse(text, mode="eval").body, now) for text in x]
             us = [_in_c(ast.parse(text, mode="eval").body, then) for text in u]
-        self.formula = _lines("xs", xs), _lines("us", us)
-        self._computed = [list(row) for row in zip(*(values for _, values in (*xs, *us)), strict=True)]
+        rows = [list(row) for row in zip(*(values for _, values in (*xs, *us)), strict=True)]
         if machine.arithmetic == "single":
-            self._computed = [[Ball(single(float(v.mid())), v.rad()) for v in row] for row in self._computed]
+            rows = [[Ball(single(float(v.mid())), v.rad()) for v in row] for row in rows]
+        return (_lines("xs", xs), _lines("us", us)), rows
 
     def _at(self, t: Fraction) -> list[Ball]:
         """x* and u* at a time, (n + m); where u* jumps, what it jumps to; of a family 0."""
@@ -105,6 +89,8 @@ class HeldPlan:
 
     def wrong(self, xs: Rows, us: Rows) -> str:
         """What is wrong with rows of the samples that are written, or with the formula; nothing if that is ""."""
+        if len(xs) != len(self.written):
+            return "the plan does not have a row for every sample"
         found = [*([Ball(v) for v in (*x, *u)] for x, u in zip(xs, us, strict=True)), *self._computed]
         samples = [*self.written, *(_LOOKED_AT if self._goes_on else ())]
         n, period = len(self._course.curve.x), self._course.spec.hardware.sample_time
@@ -140,7 +126,7 @@ def _in_c(node: ast.expr, t: list[Ball]) -> tuple[str, list[Ball]]:
         case ast.BinOp(left=left, op=op, right=right) if sign := _SIGNS.get(type(op)):
             (a, x), (b, y) = _in_c(left, t), _in_c(right, t)
             return f"({a} {sign} {b})", list(map(_APPLIED[sign], x, y))
-        case ast.Call(func=ast.Name(id=name), args=[argument]) if name in _FUNCTIONS:
+        case ast.Call(func=ast.Name(id=name), args=[argument]):
             (text, x), program = _in_c(argument, t), Program([operation(name, variable("t"))], ("t",))
             return f"{name}({text})", [program.run([v])[0] for v in x]
     raise ValueError(f"{ast.unparse(node)[:60]} in the plan")
