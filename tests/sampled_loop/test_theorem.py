@@ -398,9 +398,9 @@ def test_chords_meet_the_box_and_noise():
     loop = loop_of(**{**DOUBLE, "hardware": machine}, A=[[0, 1], [0, 0]], B=[[0], [1]])
     own = asked(loop, controller_of([[-3, -4]]), pieces=1)
     boxes = Boxes(np.array([[0.5, 0.7]]), np.array([[9.0]]), np.zeros((1, 0)))
-    (phase,), _ = own.phases(boxes)
+    (phase,), sizes = own.phases(boxes)
     off = np.array([0.1, 0.2, 0.4])
-    close(own._between(phase, off), [[(3 * 0.61 + 4 * 0.92 + 0.4) * TS**2 / 8, 1e-30]])
+    close(own._between(phase, off, sizes), [[(3 * 0.61 + 4 * 0.92 + 0.4) * TS**2 / 8, 1e-30]])
 
 
 def test_a_stage_begins_before_the_plan_ends():

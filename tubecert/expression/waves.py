@@ -40,7 +40,9 @@ def frequencies(h: Iterable[Expression], time: str) -> Frequencies | None:
     for node in topological(roots):
         args = tuple(replaced[arg] for arg in node.args)
         replaced[node] = node if args == node.args else rebuild(node, args)
-        if node.op in ("sin", "cos", "tan") and time in free_symbols(args):  # a wave of waves is as long as they are
+        if node.op in ("sin", "cos", "tan") and time in free_symbols(
+            args
+        ):  # a wave of waves is as long as they are
             slope = derivative(node.args[0], time)
             if slope.is_constant:
                 rational.append(slope.fraction)
