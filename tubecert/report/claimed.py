@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -36,7 +36,7 @@ def start_words(result: Result) -> str:
     return started(to_json(start), result.spec.effective.system, whose)
 
 
-def started(told: Mapping[str, Tree], system: SystemView, whose: str) -> str:
+def started(told: Tree, system: SystemView, whose: str) -> str:
     """The same of canonical data, where a start is within a length, in a box, or at a point."""
     if "within" in told:
         return f"within {end(Fraction(told['within']))} of the start of {whose}"

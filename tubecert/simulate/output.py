@@ -137,10 +137,11 @@ def _named(prefix: str, runs: Runs) -> dict[str, Array]:
     }
 
 
-def npz(arrays: Mapping[str, Any]) -> bytes:
+def npz(arrays: Mapping[str, Array]) -> bytes:
     """Arrays as the bytes of a file of numpy."""
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
+    compressed: Any = np.savez_compressed  # whose keywords are arrays, but for one
+    compressed(buffer, **arrays)
     return buffer.getvalue()
 
 
