@@ -85,7 +85,7 @@ def data_of(certificate: Certificate) -> Data:
         delay=machine.delayed,
         tables={name: getattr(tables, name).value for name in "FGMN"},
         limits={name: np.array([_next(q, side, real) for q in own]) for name, (side, own) in limits.items()},
-        plan=planned(result, spec),
+        plan=planned(result, spec, machine),
     )
 
 

@@ -20,7 +20,6 @@ from tubecert.findings import Finding
 from tubecert.printable import visible
 
 RUNTIME: Final = ("controller.c", "controller.h", "selftest.c")  # by hand, the same for every certificate
-_REMEDY: Final = "choose another folder with -o FOLDER, or move that file away"
 
 
 def files_of(data: Data) -> dict[str, bytes]:
@@ -48,8 +47,8 @@ def write(folder: str, files: Mapping[str, bytes]) -> None:
             replace(home / name, content)
     except (OSError, ValueError) as error:
         why = (getattr(error, "strerror", None) or str(error)).lower()
-        message = f"cannot write {visible(folder)}: {why}"
-        raise TargetError([Finding(code="TC120", message=message, help=_REMEDY)]) from error
+        message, help = f"cannot write {visible(folder)}: {why}", "choose another folder, or move it away"
+        raise TargetError([Finding(code="TC120", message=message, help=help)]) from error
 
 
 def _replaceable(path: Path) -> bool:

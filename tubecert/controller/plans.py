@@ -13,7 +13,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from tubecert.expression import FUNCTIONS
 from tubecert.findings import Finding
 from tubecert.model import build
 from tubecert.sampled_loop.record import Result
-from tubecert.spec import Knots, Spec, load_text
+from tubecert.spec import Hardware, Knots, Spec, load_text
 from tubecert.trajectory.hermite import intervals
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
@@ -34,7 +34,6 @@ _FOR_EVER: Final = 2**30  # samples of a formula: up to there its time in double
 _EVERY: Final = 4096  # of them one in the self-test: as in selftest.c
 _MOST_ROWS: Final = 1_000_000
 _SIGNS: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-At: TypeAlias = Callable[[Sequence[int]], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +50,7 @@ class Planned:
     after: int
     lead: Fraction
     rows: tuple[Array, Array]
-    at: At | None
+    at: Callable[[Sequence[int]], tuple[Array, Array]] | None
     formula: tuple[str, str] = ("", "")
 
 
@@ -69,10 +68,9 @@ def question(result: Result) -> Spec:
     return load_text(effective.at_rest(unused), "certificate")
 
 
-def planned(result: Result, spec: Spec) -> Planned:
+def planned(result: Result, spec: Spec, hardware: Hardware) -> Planned:
     """What the computer of a certificate knows of its plan. Raises TC710 for a plan that cannot be written down."""
-    hardware, horizon, afterwards = spec.hardware, spec.trajectory.horizon, result.claim.afterwards
-    assert hardware is not None
+    horizon, afterwards = spec.trajectory.horizon, result.claim.afterwards
     period, goes_on = hardware.sample_time, spec.trajectory.kind == "expressions" and afterwards == "repeat"
     lead = hardware.delayed + (period / 2 if result.claim.hold == "middle" else 0)
     steps, after = 1, 0
@@ -135,10 +133,8 @@ def _in_c(node: ast.expr) -> str:
     match node:
         case ast.Name(id="t"):
             return "t"
-        case ast.Name(id="pi"):
-            return math.pi.hex()
-        case ast.Constant(value=int() | float() as value):
-            return float(value).hex()
+        case ast.Name(id="pi") | ast.Constant(value=int() | float()):
+            return float(getattr(node, "value", math.pi)).hex()
         case ast.UnaryOp(operand=inner):
             return f"(-{_in_c(inner)})"
         case ast.BinOp(left=base, op=ast.Pow(), right=power):

@@ -119,13 +119,12 @@ def _limits(result: Result, proven: Proven) -> dict[str, list[float]]:
         "low": (1, [use.range[0] for use in result.inputs]),
         "high": (-1, [use.range[1] for use in result.inputs]),
     }
-    single_ = machine.arithmetic == "single"
-    return {name: [_next(q, side, short=single_) for q in own] for name, (side, own) in limits.items()}
+    return {name: [_next(q, side, machine.arithmetic) for q in own] for name, (side, own) in limits.items()}
 
 
-def _next(q: Fraction, side: int, *, short: bool) -> float:
+def _next(q: Fraction, side: int, arithmetic: str) -> float:
     """The number next to an exact one: not below it (side 1), or not above it (-1)."""
-    rounded, unit = (single, 2.0**-24) if short else (float, 2.0**-53)
+    rounded, unit = (single, 2.0**-24) if arithmetic == "single" else (float, 2.0**-53)
     near = rounded(float(q))
     return near if side * Fraction(near) >= side * q else rounded(near + side * 1.1 * unit * abs(near))
 

@@ -113,10 +113,9 @@ def _in_c(node: ast.expr, t: list[Ball]) -> tuple[str, list[Ball]]:
     match node:
         case ast.Name(id="t"):
             return "t", t
-        case ast.Name(id="pi"):
-            return math.pi.hex(), [arb(math.pi)] * len(t)
-        case ast.Constant(value=int() | float() as value):
-            return float(value).hex(), [arb(float(value))] * len(t)
+        case ast.Name(id="pi") | ast.Constant(value=int() | float()):
+            value = float(getattr(node, "value", math.pi))
+            return value.hex(), [arb(value)] * len(t)
         case ast.UnaryOp(op=ast.USub(), operand=inner):
             text, x = _in_c(inner, t)
             return f"(-{text})", [-v for v in x]
