@@ -66,7 +66,7 @@ def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, 
 
 
 def _changed(files: Mapping[str, bytes], certificate: str) -> str:
-    """What is not as it is shipped, or of another certificate; nothing if that is "". What was compiled is no source."""
+    """What is not as it is shipped, or of another certificate; nothing if that is "". What was compiled is none."""
     own = {*_RUNTIME, _DATA, _README}
     for name in sorted(own ^ {name for name in files if name in own or name.endswith((".c", ".h"))}):
         return f"{name[:60]} is {'none of its files' if name in files else 'missing'}"
@@ -74,8 +74,8 @@ def _changed(files: Mapping[str, bytes], certificate: str) -> str:
         if files[name] != _marked((_SHIPPED / name).read_bytes()):
             return f"{name} is not what tubecert writes"
     text = files[_README].partition(b"\n")[2]
-    own = files[_README] == _marked(text) and certificate.encode() in text
-    return "" if own else f"{_README} is not what tubecert writes"
+    kept = files[_README] == _marked(text) and certificate.encode() in text
+    return "" if kept else f"{_README} is not what tubecert writes"
 
 
 def _marked(text: bytes) -> bytes:
