@@ -219,6 +219,7 @@ RANGE = ", parameters: {p: [0.9, 1.1]}"
         ({"system": scalar("0.1*x**2")}, 0.5, 0, (), (0.125 * 0.25, 0)),  # .1 W^2, in four levels
         ({"system": scalar("0", "1 + 0.1*x")}, 0.5, 2, (), (0.1 * 0.625 * (0.5 * 2 + 2 * 0.5), 0)),
         ({"uncertainty": "{h: ['0.2*x']}"}, 0.5, 0, [0.1], (0, 0.1)),
+        ({"trajectory": WAVE, "uncertainty": "{h: ['0.2*x**2']}"}, 0.5, 0, [1], (0, 0.3 + TS / 2)),
         ({"uncertainty": "{h: ['0.2*x']}", "system": scalar("0", "1 + 0.1*x")}, 0.5, 0, [3], (0.15, 0.1)),
         ({"uncertainty": "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"}, 0.5, 0, [3], (0, 0.1)),
         ({"uncertainty": "{bounds: {h: 3}}", "system": scalar("0", "1 + 0.1*x")}, 0.5, 0, (), (0.15, 0)),
@@ -443,6 +444,7 @@ def test_what_was_sent_in_a_stage_is_met_in_the_next():
         ({"disturbance": "{E: [[1]], bound: 0.3, rate: 2}"}, 0.3, 2, 0.3),
         ({"trajectory": WAVE, "system": scalar("(p - 1)*x", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
         ({"trajectory": WAVE, "system": scalar("0", "p", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
+        ({"trajectory": WAVE, "system": scalar("(p - 1)*x**2", more=RANGE), "slow": True}, 0.1, 0.2, 0.1),
     ],
 )  # fmt: skip
 def test_sizes_and_rates(sections, size, rate, first):
