@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tubecert.simulate.clearance import of_curve, of_tube, signed_distance
+from tubecert.campaigns.obstacles import signed_distance
+from tubecert.simulate.clearance import of_curve, of_tube
 from tubecert.spec import Obstacle, load_text
 
 SPEC = """

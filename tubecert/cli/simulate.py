@@ -82,7 +82,8 @@ def run(given: Given, output: Output) -> ExitCode:
     wishes = wishes_of(system, numbers, chosen, given.gains, given.plan)
     folder = _folder(given)
     executor = Serial() if given.scheduler is None else cluster_at(given.scheduler)
-    from tubecert.simulate.output import prepared, write
+    from tubecert.campaigns.folder import prepared
+    from tubecert.simulate.output import write
     from tubecert.simulate.summary import summary
     from tubecert.simulate.told import outcome
 
@@ -100,12 +101,12 @@ def run(given: Given, output: Output) -> ExitCode:
 
 def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Output) -> ExitCode:
     """The same of a sampled loop."""
+    from tubecert.campaigns.folder import prepared
     from tubecert.library.reading import read
     from tubecert.library.sampled import SampledCertification, certified
     from tubecert.library.simulating import sampled_of
     from tubecert.report.sampled_simulation import report as report_of
     from tubecert.report.sampled_simulation import verdict_line
-    from tubecert.simulate.output import prepared
 
     words = {name: getattr(given, name) for name in ("metric", "scheduler", "controllers", "gains", "plan")}
     require_nothing_of_a_metric({**given.numbers, **words}, flag)

@@ -64,7 +64,7 @@ class SampledSimulation:
 
     def save(self, folder: File) -> list[str]:
         """Write summary, runs and figures into a folder, as the command does; their names. Raises `TargetError`."""
-        from tubecert.simulate.output import prepared, written_to
+        from tubecert.campaigns.folder import prepared, written_to
         from tubecert.simulation.figures import files
 
         with prepared(os.fspath(folder)):

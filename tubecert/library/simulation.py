@@ -92,7 +92,8 @@ class Simulation:
 
         Raises `TargetError`.
         """
-        from tubecert.simulate.output import prepared, write
+        from tubecert.campaigns.folder import prepared
+        from tubecert.simulate.output import write
 
         with prepared(os.fspath(folder)):
             return write(os.fspath(folder), self.campaign, certificate=self.compared_with)

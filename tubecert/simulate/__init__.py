@@ -21,5 +21,5 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `monte_carlo`, `campaign` | many runs and the search for the worst; all that one command simulates |
 | `compare`, `clearance` | runs against promises; distances from obstacles |
 | `summary`, `output` | a campaign as data and files |
-| `figures`, `figures_plane`, `figures_style` | figures over time, in a plane of states; what they share |
+| `figures`, `figures_plane`, `figures_style` | figures over time, in a plane of states; their lines and names |
 """

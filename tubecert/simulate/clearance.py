@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tubecert.campaigns.obstacles import corners_of, edges, in_plane, signed_distance
 from tubecert.enclosure.interval import Array
 from tubecert.spec import Obstacle, Spec
 
@@ -48,53 +49,11 @@ def of_tube(spec: Spec, t: Array, x: Array, rho: float, half_widths: Array) -> t
     return tuple(found)
 
 
-def in_plane(spec: Spec, obstacle: Obstacle, x: Array) -> Array:
-    """The two coordinates (..., 2) of an obstacle's plane."""
-    return np.asarray(x[..., [spec.states.index(name) for name in obstacle.states]])
-
-
-def signed_distance(obstacle: Obstacle, points: Array) -> Array:
-    """Distance of points (K, 2) to an obstacle, negative inside."""
-    if obstacle.radius is not None:
-        centre = np.array([float(value) for value in obstacle.center])
-        return np.asarray(np.linalg.norm(points - centre, axis=-1) - float(obstacle.radius))
-    corners = corners_of(obstacle)
-    nearest = np.min(np.stack([_to_segment(points, *edge) for edge in _edges(corners)]), axis=0)
-    return np.asarray(np.where(_inside(corners, points), -nearest, nearest))
-
-
-def corners_of(obstacle: Obstacle) -> Array:
-    """The corners of a polygon, (K, 2)."""
-    return np.array([[float(value) for value in corner] for corner in obstacle.polygon])
-
-
 def _least(number: int, t: Array, gaps: Array) -> Clearance:
     if np.isnan(gaps).all():
         return Clearance(obstacle=number, value=float("nan"), time=float(t[0]))
     step = int(np.nanargmin(gaps))
     return Clearance(obstacle=number, value=float(gaps[step]), time=float(t[step]))
-
-
-def _edges(corners: Array) -> list[tuple[Array, Array]]:
-    return list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
-
-
-def _to_segment(points: Array, a: Array, b: Array) -> Array:
-    """Distance of points (K, 2) to the segment from a to b."""
-    along = b - a
-    share = np.clip((points - a) @ along / (along @ along), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - a - share[..., None] * along, axis=-1))
-
-
-def _inside(corners: Array, points: Array) -> Array:
-    """Whether points (K, 2) are in a polygon: a ray to the right crosses an odd number of edges."""
-    crossings = np.zeros(points.shape[:-1], dtype=int)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        for a, b in _edges(corners):
-            spans = (a[1] > points[..., 1]) != (b[1] > points[..., 1])
-            at = a[0] + (points[..., 1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
-            crossings += spans & (points[..., 0] < at)
-    return np.asarray(crossings % 2 == 1)
 
 
 def _box_distance(obstacle: Obstacle, centres: Array, widths: Array) -> Array:
@@ -116,7 +75,7 @@ def _box_distance(obstacle: Obstacle, centres: Array, widths: Array) -> Array:
 def _edges_cross(boxes: Array, corners: Array) -> Array:
     """Whether an edge of a polygon crosses a side of boxes (K, 4, 2), (K,)."""
     found = np.zeros(len(boxes), dtype=bool)
-    for a, b in _edges(corners):
+    for a, b in edges(corners):
         for i in range(4):
             c, d = boxes[:, i], boxes[:, (i + 1) % 4]
             first = _turn(a, b, c) * _turn(a, b, d) <= 0

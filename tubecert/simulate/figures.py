@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tubecert.campaigns.figures import COLORS, STYLE, TUBE, blank, images, labelled
 from tubecert.enclosure.interval import Array
 from tubecert.simulate.campaign import Campaign
 from tubecert.simulate.figures_plane import plane
-from tubecert.simulate.figures_style import COLORS, NAMES, STYLE, TUBE, blank, finish, labelled, line
-from tubecert.simulate.output import images
+from tubecert.simulate.figures_style import NAMES, finish, line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,21 +6,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tubecert.campaigns.figures import LIGHT, blank, labelled, names_of, obstacles, titled
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
-from tubecert.simulate.clearance import corners_of
-from tubecert.simulate.figures_style import blank, labelled, line, title, titled
+from tubecert.simulate.campaign import Campaign
+from tubecert.simulate.figures_style import line, title
+from tubecert.simulate.setting import Setting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tubecert.simulate.campaign import Campaign
-    from tubecert.simulate.setting import Setting
-    from tubecert.spec import Spec
-
 _SHAPES: Final = 400  # cross-sections of the tube that are drawn
-LIGHT: Final = "#FBE3B5"  # of a tube, opaque: overlapping shapes must not darken each other
 
 
 def plane(campaign: Campaign) -> Figure | None:
@@ -53,15 +50,6 @@ def plane(campaign: Campaign) -> Figure | None:
     return figure
 
 
-def names_of(spec: Spec) -> tuple[str, str] | None:
-    """The states of the plane that is drawn: those asked for, else those of an obstacle, else the first two."""
-    if spec.simulation and spec.simulation.plane:
-        return spec.simulation.plane
-    if spec.obstacles:
-        return spec.obstacles[0].states
-    return (spec.states[0], spec.states[1]) if len(spec.states) > 1 else None
-
-
 def _spread(curve: Array) -> Array:
     """Points (K, 2) of a curve at equal distances along it."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
@@ -86,27 +74,6 @@ def _section(setting: Setting, i: int, j: int) -> Array:
     widths = setting.half_widths[[i, j]]
     spread = np.linalg.inv(setting.S.T @ setting.S)[np.ix_([i, j], [i, j])]
     return np.clip(setting.rho * circle @ np.linalg.cholesky(spread).T, -widths, widths)
-
-
-def obstacles(axis: Axes, spec: Spec, names: tuple[str, str]) -> None:
-    """The obstacles in a plane."""
-    from matplotlib.patches import Circle, Patch, Polygon
-
-    label: str | None = "obstacle"
-    for obstacle in spec.obstacles:
-        if set(obstacle.states) != set(names):
-            continue
-        turned = obstacle.states != names
-        patch: Patch
-        if obstacle.radius is not None:
-            center = [float(value) for value in obstacle.center]
-            patch = Circle((center[::-1] if turned else center), float(obstacle.radius))  # type: ignore[arg-type]
-        else:
-            corners = corners_of(obstacle)
-            patch = Polygon(corners[:, ::-1] if turned else corners, closed=True)
-        patch.set(facecolor="#BDBDBD", edgecolor="#6E6E6E", zorder=2, label=label)
-        axis.add_patch(patch)
-        label = None
 
 
 def _window(axis: Axes, tube: Array, curves: list[Array]) -> None:

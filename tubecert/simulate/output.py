@@ -2,57 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
-import json
 import math
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator
 
 import numpy as np
 
+from tubecert.campaigns.figures import FORMATS
+from tubecert.campaigns.folder import npz, written_to
 from tubecert.enclosure.interval import Array
-from tubecert.errors import TargetError
-from tubecert.files import replace
-from tubecert.findings import Finding
-from tubecert.records import Json
-from tubecert.simulate.figures_style import STYLE
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tubecert.simulate.campaign import Attack, Campaign, Drawn
-    from tubecert.simulate.runs import Runs
-
-SUMMARY: Final = "summary.json"
-
-FORMATS: Final = ("png", "svg")
-
-
-@contextlib.contextmanager
-def prepared(folder: str) -> Iterator[None]:
-    """Makes the folder and tries to write to it, before any work is done; raises `TargetError`.
-
-    A folder that was made here and in which nothing was written does not stay.
-    """
-    path = Path(folder)
-    try:
-        new = not path.exists()
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            pass
-    except (OSError, ValueError) as error:
-        raise _unwritable(folder, error) from None
-    try:
-        yield
-    finally:
-        if new:
-            with contextlib.suppress(OSError):  # it is not empty
-                path.rmdir()
+from tubecert.simulate.campaign import Attack, Campaign, Drawn
+from tubecert.simulate.runs import Runs
+from tubecert.simulate.summary import summary
 
 
 def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
@@ -61,26 +23,9 @@ def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
     Earlier figures that are not replaced do not stay: to draw takes seconds, which an interruption does not leave.
     """
     from tubecert.simulate.figures import drawers
-    from tubecert.simulate.summary import summary
 
     names = [f"{name}.{kind}" for name in drawers() for kind in FORMATS]
     return written_to(folder, summary(campaign, certificate).to_json(), _files(campaign), names)
-
-
-def written_to(
-    folder: str, summary: Json, files: Iterable[tuple[str, bytes]], outdated: Sequence[str] = ()
-) -> list[str]:
-    """Writes files, then the summary: a folder that has it is complete. Their names; raises `TargetError`."""
-    written, text = [], json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n"
-    try:
-        for name in (SUMMARY, *outdated):  # of earlier files, which are now replaced
-            (Path(folder) / name).unlink(missing_ok=True)
-        for name, data in chain(files, [(SUMMARY, text.encode())]):
-            replace(Path(folder) / name, data)
-            written.append(name)
-    except OSError as error:
-        raise _unwritable(folder, error) from None
-    return written
 
 
 def _files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
@@ -94,18 +39,6 @@ def _files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
             yield f"monte_carlo_{attack.loop.controller}.csv", _table(*_sample_table(campaign, attack))
     if not campaign.interrupted:
         yield from figures(campaign)
-
-
-def images(name: str, figure: Figure) -> Iterator[tuple[str, bytes]]:
-    """The files of a figure."""
-    import matplotlib as mpl
-
-    for kind in FORMATS:
-        buffer = io.BytesIO()
-        metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
-        with mpl.rc_context(STYLE):
-            figure.savefig(buffer, format=kind, metadata=metadata)
-        yield f"{name}.{kind}", buffer.getvalue()
 
 
 def _arrays(campaign: Campaign) -> dict[str, Array]:
@@ -135,14 +68,6 @@ def _named(prefix: str, runs: Runs) -> dict[str, Array]:
     return {f"{prefix}_{name}": value for name, value in shared.items()} | {
         f"{prefix}_{name}": getattr(runs, name)[0] for name in own
     }
-
-
-def npz(arrays: Mapping[str, Array]) -> bytes:
-    """Arrays as the bytes of a file of numpy."""
-    buffer = io.BytesIO()
-    compressed: Any = np.savez_compressed  # whose keywords are arrays, but for one
-    compressed(buffer, **arrays)
-    return buffer.getvalue()
 
 
 def _drawn_table(campaign: Campaign, item: Drawn) -> tuple[list[str], Array]:
@@ -197,10 +122,3 @@ def _cell(value: float) -> str:
     if not math.isfinite(value):
         return ""
     return f"{value:.0f}" if value == int(value) and abs(value) < 1e15 else f"{value:.9g}"
-
-
-def _unwritable(folder: str, error: Any) -> TargetError:
-    """The error for a folder that cannot be written to."""
-    why = (getattr(error, "strerror", None) or str(error)).lower()
-    message = f"cannot write to the folder {folder}: {why}"
-    return TargetError([Finding(code="TC120", message=message, help="choose another folder with -o FOLDER")])

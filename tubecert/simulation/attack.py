@@ -6,7 +6,6 @@ sign of the kernel, h goes where `kernels.goals` sends it. Run i of a seed is th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -27,11 +26,23 @@ _LAGS: Final = 5000  # of the loop that an adversary looks back, at most
 _SETTLED: Final = 1e-4  # of the largest start: where the loop has forgotten it
 
 
+class Draws(NamedTuple):
+    """Uniform in [0, 1), (.., N), by what they are for."""
+
+    kind: Array
+    parameters: Array
+    start: Array
+    noise: Array
+    wind: Array
+    slow: Array
+    plan: Array
+
+
 class Lanes(NamedTuple):
     """N runs, by their numbers: which are adversaries (`aimed`), which have the specification's h (`own`), all (N,).
 
-    Adversaries want the greatest or the least (`sign`) of state or input `target` at `sample`. `draws` (.., N) are
-    uniform in [0, 1), by what they are for; half of the `parameters` (p, N) are corners; `off` (n, N): x(0) - x*(0).
+    Adversaries want the greatest or the least (`sign`) of state or input `target` at `sample`. Half of the
+    `parameters` (p, N) are corners; `off` (n, N): x(0) - x*(0).
     """
 
     number: Integers
@@ -40,7 +51,7 @@ class Lanes(NamedTuple):
     sample: Integers
     target: Integers
     sign: Integers
-    draws: Mapping[str, Array]
+    draws: Draws
     parameters: Array
     off: Array
 
@@ -90,23 +101,21 @@ class Attack:
         draws, aimed = self._drawn(number), number < len(self.aims)
         rows = np.vstack([self.aims, [0, 0, 0, 1]])[np.minimum(number, len(self.aims))]
         chosen, sample, target, sign = rows.T
-        free = (draws["kind"][0] < 0.5) | (not setting.loop.matched)
+        free = (draws.kind[0] < 0.5) | (not setting.loop.matched)
         own = np.where(aimed, chosen, (setting.own is not None) & free).astype(bool)
-        share, kind = np.split(draws["parameters"], 2)
+        share, kind = np.split(draws.parameters, 2)
         low, high = setting.ranges.T[:, :, None]
         parameters = low + np.where(kind < 0.5, np.round(share), share) * (high - low)
-        off = self._off(draws["start"], aimed, _of(self.worst.start, sample, target, sign))
+        off = self._off(draws.start, aimed, _of(self.worst.start, sample, target, sign))
         return Lanes(number, aimed, own, sample, target, sign, draws, parameters, off)
 
-    def _drawn(self, number: Integers) -> dict[str, Array]:
+    def _drawn(self, number: Integers) -> Draws:
         """What lanes draw, run by run."""
         own, (n, k) = self.setting, self.setting.loop.E.shape
-        parts = {"kind": 1, "parameters": 2 * len(own.ranges), "start": n + 1, "noise": 3 * n, "wind": 3 * k}
-        parts |= {"slow": 3 * len(own.slow.size), "plan": drawn(own)}
+        ends = np.cumsum([1, 2 * len(own.ranges), n + 1, 3 * n, 3 * k, 3 * len(own.slow.size), drawn(own)])
         seeds = [np.random.SeedSequence(self.seed, spawn_key=(run,)) for run in number.tolist()]
-        draws = [np.random.default_rng(seed).random(sum(parts.values())) for seed in seeds]
-        split = np.split(np.stack(draws, axis=1), np.cumsum([*parts.values()])[:-1])
-        return dict(zip(parts, split, strict=True))
+        draws = [np.random.default_rng(seed).random(int(ends[-1])) for seed in seeds]
+        return Draws(*np.split(np.stack(draws, axis=1), ends[:-1]))
 
     def _off(self, draws: Array, aimed: Flags, worst: Array) -> Array:
         """x(0) - x*(0), (n, N)."""
@@ -118,12 +127,13 @@ class Attack:
 
     def noise(self, lanes: Lanes, k: int) -> Array:
         """What the measurements of sample k are wrong by, (n, N)."""
-        return _within(self._signal(lanes, "noise", self.worst.noise, k), self.setting.loop.noise)
+        return _within(self._signal(lanes, lanes.draws.noise, self.worst.noise, k), self.setting.loop.noise)
 
     def wind(self, lanes: Lanes, k: int, part: int) -> Array:
         """The sudden wind in a part of sample k, (k, N)."""
         later = part / len(self.setting.lengths)
-        return _within(self._signal(lanes, "wind", self.worst.wind[:, :, part], k, later), self.setting.gusts)
+        raw = self._signal(lanes, lanes.draws.wind, self.worst.wind[:, :, part], k, later)
+        return _within(raw, self.setting.gusts)
 
     def sent(self, lanes: Lanes, k: int, now: Array | float = 0.0) -> Array:
         """Slow signals (r, N) at the end of sample k, from `now` on; before the first, k = -1: where they start.
@@ -131,16 +141,16 @@ class Attack:
         Where lanes have the specification's h, there is no other beside inputs.
         """
         own, slow = self.setting, self.setting.slow
-        goal = slow.size[:, None] * self._signal(lanes, "slow", self.worst.slow, k)
+        goal = slow.size[:, None] * self._signal(lanes, lanes.draws.slow, self.worst.slow, k)
         most = (slow.first if k < 0 else slow.rate * own.Ts)[:, None]
         taken = np.outer(own.spread[: own.loop.inputs].any(axis=0), lanes.own)
         return np.where(taken, 0.0, np.clip(goal, now - most, now + most))
 
-    def _signal(self, lanes: Lanes, name: str, table: Array, k: int, later: float = 0.0) -> Array:
+    def _signal(self, lanes: Lanes, draws: Array, table: Array, k: int, later: float = 0.0) -> Array:
         """Of adversaries the table's, of the others square waves, as shares (c, N)."""
         lag = lanes.sample - k if k < 0 else (lanes.sample - k) % (lanes.sample + 1)
         aimed = _of(table, lag, lanes.target, lanes.sign)
-        return np.where(lanes.aimed, aimed, waves(lanes.draws[name], self.setting.samples, k + later))
+        return np.where(lanes.aimed, aimed, waves(draws, self.setting.samples, k + later))
 
 
 def _of(table: Array, lag: Integers, target: Integers, sign: Integers) -> Array:

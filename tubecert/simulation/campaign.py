@@ -15,7 +15,6 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.progress import Phase, Progress, Step
-from tubecert.records import Json
 from tubecert.simulation.attack import Attack, Flags, Lanes
 from tubecert.simulation.families import course_of, courses
 from tubecert.simulation.sampled import SINGLE, Controllers, Seen, linear, run
@@ -55,7 +54,7 @@ def simulate(
 def chunk(attack: Attack, lanes: Lanes, controllers: Controllers | None = None) -> Seen:
     """What is seen of some lanes, in steps that are short enough if any are."""
     setting, bundle = attack.setting, attack.setting.spec.trajectory.bundle
-    course = course_of(setting) if bundle is None else courses(setting, bundle, lanes.draws["plan"])
+    course = course_of(setting) if bundle is None else courses(setting, bundle, lanes.draws.plan)
     made = controllers or partial(linear, setting.tables)
     size = float(abs(setting.loop.A).sum(axis=1).max() * setting.lengths.max())
     for finer in range(_FINER):
@@ -214,7 +213,7 @@ class Campaign:
         return Violation(names[index], aimed, self._peak(index, number)._replace(t=left))
 
     @property
-    def summary(self) -> Json:
+    def summary(self) -> dict[str, object]:
         """What `summary.json` holds; times in s, `stages` when they begin."""
         own, told = self.setting, ("outcome", "certificate", "asked", "runs", "controller", "error")
         attained = {name: self._attained(i) for i, name in enumerate(own.names)}
@@ -236,8 +235,8 @@ class Campaign:
             ],
         }
 
-    def _attained(self, index: int) -> Json:
-        found: Json = {}
+    def _attained(self, index: int) -> dict[str, object]:
+        found = dict[str, object]()
         for g, (name, group) in enumerate((("random", ~self.aimed), ("adversary", self.aimed))):
             peak = self.peak(index, group)
             found[name] = peak and peak._asdict()

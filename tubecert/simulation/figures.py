@@ -8,10 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tubecert.campaigns.figures import (
+    COLORS,
+    LIGHT,
+    STYLE,
+    TUBE,
+    blank,
+    images,
+    labelled,
+    names_of,
+    obstacles,
+    titled,
+)
+from tubecert.campaigns.folder import npz
 from tubecert.enclosure.interval import Array
-from tubecert.simulate.figures_plane import LIGHT, names_of, obstacles
-from tubecert.simulate.figures_style import COLORS, STYLE, TUBE, blank, labelled, titled
-from tubecert.simulate.output import images, npz
 from tubecert.simulation.campaign import Campaign
 
 if TYPE_CHECKING:
@@ -52,7 +62,7 @@ def _tube_use(campaign: Campaign) -> Figure:
     t = np.arange(own.samples) * own.Ts
     bounds = np.hstack([own.at(k) for k in range(own.samples)])
     for i, (axis, name) in enumerate(zip(axes, own.names, strict=True)):
-        axis.fill_between(t, 0, bounds[i], step="post", color=TUBE, alpha=0.25, lw=0, label="proven")
+        axis.fill_between(t, 0, bounds[i], step="post", color=TUBE, alpha=0.25, lw=0, label="tube")
         for (label, color), profile in zip(_GROUPS, campaign.profile, strict=True):
             axis.plot(t, profile[i] * bounds[i], color=color, lw=1.0, label=label)
         axis.set_ylabel(labelled(own.spec, name, f"|{name} - {name}*|"))

@@ -8,9 +8,9 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
+from tubecert.campaigns.obstacles import in_plane, signed_distance
 from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.setting import Controller
-from tubecert.simulate.clearance import in_plane, signed_distance
 from tubecert.simulation.attack import Attack, Flags, Lanes
 from tubecert.simulation.families import Course, integrated
 from tubecert.simulation.setting import Setting

@@ -1,0 +1,107 @@
+"""What the figures of all campaigns have in common: colours, labels, legends, obstacles; a figure as files.
+
+Colours are those of Okabe and Ito, told apart by everybody; what is certified is orange, the plan is dashed black.
+Trusted: no.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+from tubecert.campaigns.obstacles import corners_of
+from tubecert.spec import Spec
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FORMATS: Final = ("png", "svg")
+COLORS: Final = {
+    "l1": "#0072B2",
+    "ccm": "#D55E00",
+    "reference": "#CC79A7",
+    "nominal": "#7F7F7F",
+}
+TUBE: Final = "#E69F00"
+LIGHT: Final = "#FBE3B5"  # of a tube, opaque: overlapping shapes must not darken each other
+STYLE: Final[Any] = {
+    "svg.hashsalt": "tubecert",
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.alpha": 0.25,
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.4,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "savefig.dpi": 150,
+}
+
+
+def blank(width: float, height: float) -> Figure:
+    """An empty figure, in inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def labelled(spec: Spec, name: str, words: str = "") -> str:
+    """A state or input, or `words` about it, with its unit, as far as the specification tells."""
+    unit = dict(spec.units).get(name)
+    return f"{words or name} [{unit}]" if unit else words or name
+
+
+def names_of(spec: Spec) -> tuple[str, str] | None:
+    """The states of the plane that is drawn: those asked for, else those of an obstacle, else the first two."""
+    if spec.simulation and spec.simulation.plane:
+        return spec.simulation.plane
+    if spec.obstacles:
+        return spec.obstacles[0].states
+    return (spec.states[0], spec.states[1]) if len(spec.states) > 1 else None
+
+
+def obstacles(axis: Axes, spec: Spec, names: tuple[str, str]) -> None:
+    """The obstacles in a plane."""
+    from matplotlib.patches import Circle, Patch, Polygon
+
+    label: str | None = "obstacle"
+    for obstacle in spec.obstacles:
+        if set(obstacle.states) != set(names):
+            continue
+        turned = obstacle.states != names
+        patch: Patch
+        if obstacle.radius is not None:
+            center = [float(value) for value in obstacle.center]
+            patch = Circle((center[::-1] if turned else center), float(obstacle.radius))  # type: ignore[arg-type]
+        else:
+            corners = corners_of(obstacle)
+            patch = Polygon(corners[:, ::-1] if turned else corners, closed=True)
+        patch.set(facecolor="#BDBDBD", edgecolor="#6E6E6E", zorder=2, label=label)
+        axis.add_patch(patch)
+        label = None
+
+
+def titled(figure: Figure, axis: Axes, words: str, columns: int) -> None:
+    """A title, and the labels of an axis as the legend."""
+    axis.set_title(words, fontsize=9, loc="left")
+    handles, labels = axis.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def images(name: str, figure: Figure) -> Iterator[tuple[str, bytes]]:
+    """The files of a figure."""
+    import matplotlib as mpl
+
+    for kind in FORMATS:
+        buffer = io.BytesIO()
+        metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+        with mpl.rc_context(STYLE):
+            figure.savefig(buffer, format=kind, metadata=metadata)
+        yield f"{name}.{kind}", buffer.getvalue()

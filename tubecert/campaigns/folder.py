@@ -1,0 +1,73 @@
+"""The folder of a campaign: tried before any work is done, and complete when it has its summary. Trusted: no."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.errors import TargetError
+from tubecert.files import replace
+from tubecert.findings import Finding
+
+SUMMARY: Final = "summary.json"
+
+
+@contextlib.contextmanager
+def prepared(folder: str) -> Iterator[None]:
+    """Makes the folder and tries to write to it, before any work is done; raises `TargetError`.
+
+    A folder that was made here and in which nothing was written does not stay.
+    """
+    path = Path(folder)
+    try:
+        new = not path.exists()
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except (OSError, ValueError) as error:
+        raise _unwritable(folder, error) from None
+    try:
+        yield
+    finally:
+        if new:
+            with contextlib.suppress(OSError):  # it is not empty
+                path.rmdir()
+
+
+def written_to(
+    folder: str, summary: object, files: Iterable[tuple[str, bytes]], outdated: Sequence[str] = ()
+) -> list[str]:
+    """Writes files, then the summary: a folder that has it is complete. Their names; raises `TargetError`."""
+    written, text = [], json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n"
+    try:
+        for name in (SUMMARY, *outdated):  # of earlier files, which are now replaced
+            (Path(folder) / name).unlink(missing_ok=True)
+        for name, data in chain(files, [(SUMMARY, text.encode())]):
+            replace(Path(folder) / name, data)
+            written.append(name)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    return written
+
+
+def npz(arrays: Mapping[str, NDArray[np.generic]]) -> bytes:
+    """Arrays as the bytes of a file of numpy."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    return buffer.getvalue()
+
+
+def _unwritable(folder: str, error: Exception) -> TargetError:
+    """The error for a folder that cannot be written to."""
+    why = (getattr(error, "strerror", None) or str(error)).lower()
+    message = f"cannot write to the folder {folder}: {why}"
+    return TargetError([Finding(code="TC120", message=message, help="choose another folder with -o FOLDER")])
