@@ -10,23 +10,25 @@ from functools import cached_property, partial
 from flint import arb, arb_mat
 
 from tubecert.recheck import planned
-from tubecert.recheck.balls import exact
+from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.cover import Outcome, Range
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.metric import CONFIRMED, smooth, stated, together
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.sampled_loop.conditions import Inequalities, Rounding, phases_of
+from tubecert.recheck.sampled_loop.conditions import Inequalities, phases_of
+from tubecert.recheck.sampled_loop.exponential import column, joined, sizes
 from tubecert.recheck.sampled_loop.loop import Loop
 from tubecert.recheck.sampled_loop.obstacles import cleared
 from tubecert.recheck.sampled_loop.record import Certificate, Floats, InputUse, Proven, Result
-from tubecert.recheck.sampled_loop.remainders import Remainders, Size
-from tubecert.recheck.sampled_loop.rows import Ground, Problem, Signals, Start
+from tubecert.recheck.sampled_loop.remainders import PLAN, Remainders, Size, Slow
+from tubecert.recheck.sampled_loop.rows import Ground, Problem
 from tubecert.recheck.sampled_loop.windows import Course, course_of
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 from tubecert.recheck.times import time_range
 
 _ROUNDING = {"single": Fraction(1, 2**24), "double": Fraction(1, 2**53)}
-_PLAN = Fraction(1, 2**24)
+_FLUSHED = Fraction(1, 10**35)  # what a computer loses that has no subnormal numbers
+_SECOND = 1 + Fraction(1, 2**20)  # rounding of what is a rounding already
 ROWS = 53  # bits, in which rows are carried
 
 
@@ -49,12 +51,13 @@ def _of_certified(case: Case) -> Iterator[Claim]:
     for i, name in enumerate(spec.plant.states):
         yield Claim(f"the tube of {name} lies in the safe set", None, partial(case.inside, i))
     yield Claim("what acts on the loop is bounded", None, case.known)
-    for i, name in enumerate(spec.plant.states):
-        yield Claim(f"|{name} - {name}*| inside the tube", None, partial(case.errors, i), ROWS)
-    for j, name in enumerate(spec.plant.inputs):
-        yield Claim(f"what is added to {name}", None, partial(case.deviation, j), ROWS)
-    for j in range(len(proven.tables.F)):
-        yield Claim(f"memory {j + 1} of the controller", None, partial(case.memory, j), ROWS)
+    outputs = [
+        *(f"|{name} - {name}*| inside the tube" for name in spec.plant.states),
+        *(f"what is added to {name}" for name in spec.plant.inputs),
+        *(f"memory {j + 1} of the controller" for j in range(len(proven.tables.F))),
+    ]
+    for f, name in enumerate(outputs):
+        yield Claim(name, None, partial(case.output, f), ROWS)
     for own in result.inputs:
         yield Claim(f"{own.name} keeps to its range", None, partial(case.keeps, own))
     for index, verdict in result.clearance:
@@ -125,25 +128,25 @@ class Case:
     def remainders(self) -> Remainders:
         """What is not linear."""
         own, recipe = self.proven.nominal, self.proven.recipe
-        return Remainders(self.course, own.A, own.B, own.E, recipe.windows, slow=recipe.slow)
+        n, m = len(self._spec.plant.states), len(self._spec.plant.inputs)
+        nominal = _matrix(own.A, n, n), _matrix(own.B, n, m), _matrix(own.E, n, len(own.E[0]))
+        return Remainders(self.course, nominal, recipe.windows, slow=recipe.slow)
 
     @cached_property
-    def _widest(self) -> list[arb]:
-        """W of all stages together."""
-        return [exact(max(own)) for own in zip(*(own.half_widths for own in self.proven.stages), strict=True)]
+    def _slow(self) -> list[Slow]:
+        """Slow signals where e is in the boxes of all stages."""
+        widest = [max(own) for own in zip(*(own.half_widths for own in self.proven.stages), strict=True)]
+        return self.remainders.slow(list(map(exact, widest)))
 
     @cached_property
     def inequalities(self) -> Inequalities:
         """Of this loop."""
-        spec, proven, remainders = self._spec, self.proven, self.remainders
-        machine, n, m = spec.hardware, len(spec.plant.states), len(spec.plant.inputs)
-        slow = remainders.slow(self._widest)
-        tables, noise = proven.tables, Size.of(machine.noise, n)
-        z, r = len(tables.F), len(slow)
+        machine, proven, tables = self._spec.hardware, self.proven, self.proven.tables
+        n, m, z = len(self._spec.plant.states), len(self._spec.plant.inputs), len(tables.F)
         loop = Loop(
             A=_matrix(proven.nominal.A, n, n),
             B=_matrix(proven.nominal.B, n, m),
-            H=arb_mat(n, r, [own.column[i] for i in range(n) for own in slow]),
+            H=arb_mat(n, len(self._slow), [own.column[i] for i in range(n) for own in self._slow]),
             F=_matrix(tables.F, z, z),
             G=_matrix(tables.G, z, n),
             M=_matrix(tables.M, m, z),
@@ -151,38 +154,47 @@ class Case:
             sample=machine.sample_time,
             delay=machine.delay,
         )
-        signals = Signals(
-            noise=noise.each,
-            noise_length=noise.length,
-            winds=[
-                (_matrix(own, n, len(own[0])), size.each, size.length) for own, size in remainders.sudden()
-            ],
-            slow=[own.size for own in slow],
-            rates=[own.rate for own in slow],
-            first=[own.first for own in slow],
-        )
-        above = [x + y for x, y in zip(remainders.inputs_above, remainders.held, strict=True)]
-        rounding = Rounding(_ROUNDING[machine.arithmetic], remainders.states_above, above)
-        grounds = []
-        for begin, stage, acting in phases_of(proven.stages, loop.waiting):
+        noise, grounds = Size.of(machine.noise, n), []
+        for begin, stage, acting in phases_of(proven.stages, loop.shape[3]):
             W, Z, U = (list(map(exact, own)) for own in (stage.half_widths, stage.memory, acting))
-            rho = remainders.rho(W, U, slow)
-            box = [*W, *Z, *U * loop.waiting, *signals.slow]
-            grounds.append(Ground(begin, stage, *rho, *rounding.of(loop, noise.each, W, Z), box))
+            box = [*W, *Z, *U * loop.shape[3], *(own.size for own in self._slow)]
+            rho = self.remainders.rho(W, U, self._slow)
+            grounds.append(Ground(begin, stage, rho, self._rounding(loop, noise, W, Z), box))
         lags, intervals = proven.recipe.lags, self.course.intervals
         last = proven.stages[-1].start + loop.whole + 1 + lags
         last = last if intervals is None else min(last, intervals - 1)
-        return Inequalities(Problem(loop, signals, self._start(), grounds, lags, last), proven.recipe)
+        winds = self.remainders.sudden()
+        problem = Problem(loop, noise, winds, self._slow, *self._start(), grounds, lags, last)
+        return Inequalities(problem, proven.recipe)
 
-    def _start(self) -> Start:
-        """x(0) - x*(0)."""
+    def _rounding(self, loop: Loop, noise: Size, W: Sequence[Ball], Z: Sequence[Ball]) -> list[Ball]:
+        """What dy (n), u (m) and zeta (z) are off by, (D.8)."""
+        u, k, own = (
+            _ROUNDING[self._spec.hardware.arithmetic],
+            loop.shape[2] + loop.shape[0] + 3,
+            self.remainders,
+        )
+        gamma, lost, states = (
+            exact(k * u / (1 - k * u)),
+            exact(_FLUSHED),
+            zip(own.states_above, W, noise.each, strict=True),
+        )
+        measured = [
+            (exact(PLAN) * x + exact(2 * u) * (2 * x + w + s)) * exact(_SECOND) + lost for x, w, s in states
+        ]
+        seen = [w + s + y for w, s, y in zip(W, noise.each, measured, strict=True)]
+        told = sizes(joined([[loop.M, loop.N], [loop.F, loop.G]])) * column([*Z, *seen])
+        planned = [*map(arb.__add__, own.inputs_above, own.held), *[arb(0)] * len(Z)]
+        return [*measured, *(gamma * (x + y) + lost for x, y in zip(planned, told.entries(), strict=True))]
+
+    def _start(self) -> tuple[list[Ball], Ball]:
+        """x(0) - x*(0): a point or a box (n), and within how much of that."""
         start, n = self._spec.start, len(self._spec.plant.states)
         if start.within is not None:
-            return Start([arb(0)] * n, exact(start.within))
-        planned_ = self.course.curve.somewhere()
+            return [arb(0)] * n, exact(start.within)
         ends = [(q, q) for q in start.at] if start.at is not None else list((start.box or {}).values())
         around = [exact((a + b) / 2) + arb(0, exact((b - a) / 2)) for a, b in ends]
-        return Start([x - y for x, y in zip(around, planned_, strict=True)], arb(0))
+        return [x - y for x, y in zip(around, self.course.curve.somewhere(), strict=True)], arb(0)
 
     # -- claims
 
@@ -212,7 +224,7 @@ class Case:
 
     def fits(self) -> Outcome:
         """Cuts are there for every slow signal, and signals that are taken for slow have a rate."""
-        signals = len(self.remainders.slow(self._widest))
+        signals = len(self._slow)
         rows = all(len(row) == signals for row in self.proven.recipe.cuts)
         if not rows:
             return stated(False, f"there are {signals} slow signals, and cuts of another number")
@@ -220,37 +232,27 @@ class Case:
 
     def inside(self, i: int) -> Outcome:
         """The tube of a state lies in the safe set."""
-        _, holds = list(self.remainders.inside(self._widest))[i]
-        return CONFIRMED if holds else Outcome(verdict="undecided", why="it could not be shown")
+        W = exact(max(own.half_widths[i] for own in self.proven.stages))
+        return _shown(self.remainders.inside(i, W), "it could not be shown")
 
     def known(self) -> Outcome:
         """All that acts on the loop is bounded."""
         grounds = self.inequalities.problem.grounds
-        finite = all(
-            x.is_finite() for own in grounds for x in (*own.remainder, *own.through_inputs, *own.box)
-        )
-        return CONFIRMED if finite else Outcome(verdict="undecided", why="a supremum is not finite")
+        finite = all(x.is_finite() for own in grounds for x in (*own.acting, *own.box))
+        return _shown(finite, "a supremum is not finite")
 
-    def errors(self, i: int) -> Outcome:
-        """|e_i| < W_i at all times."""
-        return self.inequalities.errors(i)
-
-    def deviation(self, j: int) -> Outcome:
-        """|delta_j| <= U_j at every sample."""
-        return self.inequalities.deviation(j)
-
-    def memory(self, j: int) -> Outcome:
-        """|zeta_j| in its box."""
-        return self.inequalities.memory(j)
+    def output(self, f: int) -> Outcome:
+        """|e_i| < W_i at all times; |delta_j| < U_j, and zeta in its box, at every sample."""
+        return self.inequalities.output(f)
 
     def keeps(self, own: InputUse) -> Outcome:
         """u* and all that is added, with what a computer misses u* by, are in the range that is stated."""
         j = self._spec.plant.inputs.index(own.name)
         more = exact(max(stage.deviations[j] for stage in self.proven.stages))
-        more += exact(_PLAN) * self.remainders.inputs_above[j]
+        more += exact(PLAN) * self.remainders.inputs_above[j]
         low, high = map(exact, own.range)
-        holds = all(low <= u - more and u + more <= high for u in self.remainders.inputs(j))
-        return CONFIRMED if holds else Outcome(verdict="undecided", why="it may leave it")
+        planned_ = [own.u[j] for own in self.remainders.windows]
+        return _shown(all(low <= u - more and u + more <= high for u in planned_), "it may leave it")
 
     def cleared(self, index: int) -> Outcome:
         """The tube keeps away from an obstacle."""
@@ -266,5 +268,9 @@ class Case:
         return stated(max(widths) <= wish, "it is wider")
 
 
-def _matrix(rows: Floats | Sequence[Sequence[float]], p: int, q: int) -> arb_mat:
+def _shown(holds: bool, why: str) -> Outcome:
+    return CONFIRMED if holds else Outcome(verdict="undecided", why=why)
+
+
+def _matrix(rows: Floats, p: int, q: int) -> arb_mat:
     return arb_mat(p, q, [arb(x) for row in rows for x in row])

@@ -16,9 +16,20 @@ def zeros(p: int, q: int) -> arb_mat:
     return arb_mat(p, q)
 
 
+def diagonal(entries: Sequence[Ball | int]) -> arb_mat:
+    """A square matrix with these entries on its diagonal."""
+    n = len(entries)
+    return arb_mat(n, n, [entries[i] if i == j else 0 for i in range(n) for j in range(n)])
+
+
 def identity(n: int) -> arb_mat:
     """The unit matrix."""
-    return arb_mat(n, n, [arb(int(i == j)) for i in range(n) for j in range(n)])
+    return diagonal([1] * n)
+
+
+def column(entries: Sequence[Ball]) -> arb_mat:
+    """A matrix of one column."""
+    return arb_mat(len(entries), 1, list(entries))
 
 
 def joined(blocks: Blocks) -> arb_mat:
@@ -26,20 +37,23 @@ def joined(blocks: Blocks) -> arb_mat:
     width = sum(block.ncols() for block in blocks[0])
     flat: list[arb] = []
     for row in blocks:
-        tables: list[list[list[arb]]] = [
-            block.tolist() if block.ncols() else [[]] * block.nrows() for block in row
-        ]
+        tables: list[list[list[arb]]] = [block.tolist() for block in row]
         for lines in zip(*tables, strict=True):
             flat += [x for line in lines for x in line]
     return arb_mat(sum(row[0].nrows() for row in blocks), width, flat)
 
 
+def parted(a: arb_mat, at: int) -> tuple[arb_mat, arb_mat]:
+    """The columns before one, and the others."""
+    left, right = ([x for row in a.tolist() for x in row[part]] for part in (slice(at), slice(at, None)))
+    return arb_mat(a.nrows(), at, left), arb_mat(a.nrows(), a.ncols() - at, right)
+
+
 def flow(A: arb_mat, t: Ball) -> tuple[arb_mat, arb_mat]:
     """e^(A t) and int_0^t e^(A s) ds, both (n, n), for every t of the ball: e^[[A t, I t], [0, 0]] holds both."""
     n = A.nrows()
-    whole = joined([[A * t, identity(n) * t], [zeros(n, n), zeros(n, n)]]).exp().tolist()
-    first, second = ([x for row in whole[:n] for x in row[a : a + n]] for a in (0, n))
-    return arb_mat(n, n, first), arb_mat(n, n, second)
+    whole = joined([[A * t, identity(n) * t], [zeros(n, 2 * n)]]).exp().tolist()
+    return parted(arb_mat(whole[:n]), n)
 
 
 def sizes(a: arb_mat) -> arb_mat:

@@ -58,6 +58,11 @@ class Stage:
     deviations: Numbers
     memory: Numbers
 
+    @property
+    def boxes(self) -> Numbers:
+        """All of them, (n + m + z)."""
+        return (*self.half_widths, *self.deviations, *self.memory)
+
 
 @dataclass(frozen=True, slots=True)
 class Recipe:

@@ -1,21 +1,24 @@
 """Where a plan is and how fast it moves: windows of its time that cover it, or cells that cover a family's boxes.
 
 Beside that: how far its input is from what the actuators hold, and how far it is from a motion of the plant.
+Implements: theory of the sampled loop, section 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise, product
+from functools import cached_property, reduce
+from heapq import heapify, heappush, heapreplace
+from itertools import islice, pairwise, product
 from math import ceil
 
 from flint import arb
 
 from tubecert.recheck.balls import Ball, between, ceiling, exact, floor
 from tubecert.recheck.boxes import Field
-from tubecert.recheck.curve import CLOCK, Curve, Knots, Part, expressed, hermite
+from tubecert.recheck.curve import CLOCK, Curve, Knots, expressed, hermite
 from tubecert.recheck.family import everyone
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.plans import Plan
@@ -24,13 +27,20 @@ from tubecert.recheck.reading import TIME, upright
 from tubecert.recheck.specification import SampledSpecification
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting
 from tubecert.recheck.system import knots_of
-from tubecert.recheck.terms import Term, matrix_replaced, names, number, plus, slopes, times, variable
+from tubecert.recheck.terms import (
+    Matrix,
+    Term,
+    names,
+    number,
+    plus,
+    replaced,
+    slopes,
+    times,
+    variable,
+)
 from tubecert.recheck.times import common_period
 
-_REFINED = 20  # times as many evaluations as windows, for a defect
-_SHARP = 1.005  # a supremum is not looked for more closely than that,
-_MEANS_NOTHING = 1e-10  # ... nor than this, in units of the states per s
-_PARTS = 128  # of a period of h
+_HALVINGS = 500  # for one supremum along a plan
 
 
 @dataclass(frozen=True)
@@ -93,165 +103,138 @@ class Course:
 
     def windows(self, count: int) -> list[Window]:
         """About so many windows, or cells, that cover it."""
-        found = list(self._cells(count) if self.family is not None else self._along(count))
+        if self.family is not None:
+            return list(self._cells(self.family, count))
+        found = list(self._along(count))
         if self.spec.afterwards == "rest":  # where it is then, without moving
-            x, u = self._end
-            found.append(Window(x, u, [arb(0)] * len(x), [arb(0)] * len(u), None))
+            (x, u), n = self._end, len(self.curve.x)
+            still = [arb(0)] * (n + len(u))
+            found.append(Window(x, u, still[:n], still[n:], None))
         return found
 
     @property
     def _end(self) -> tuple[list[Ball], list[Ball]]:
         """x* and u* at the end, of inputs that jump there those before."""
-        part = self.curve.parts[-1]
-        field = self.curve.field.with_values(part.values)
-        found = field.at([part.length] if field.variables else [])
-        return found[: len(self.curve.x)], found[len(self.curve.x) :]
+        last, n = self.curve.parts[-1], len(self.curve.x)
+        field = self.curve.field.with_values(last.values)
+        found = field.at([last.length] if field.variables else [])
+        return found[:n], found[n:]
+
+    @cached_property
+    def F(self) -> list[Term]:
+        """The plant for the middles of parameters, f + B u, (n,)."""
+        return driven(self.spec.plant.f, self.spec.plant.B, self.spec.plant.inputs)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of states and inputs."""
+        return (*self.spec.plant.states, *self.spec.plant.inputs)
 
     def _along(self, count: int) -> Iterator[Window]:
         curve, n, m = self.curve, len(self.curve.x), len(self.curve.u)
+        terms = [*curve.x, *curve.u, *curve.slope, *slopes(curve.u, CLOCK)]
+        field = Field(terms, curve.parts[0].values)
         whole = sum((float(part.length.mid()) for part in curve.parts), start=0.0)
-        field = Field([*curve.x, *curve.u, *curve.slope, *slopes(curve.u, CLOCK)], curve.parts[0].values)
         timed = self.horizon is not None and curve.moves
         for part in curve.parts:
             pieces = ceil(count * float(part.length.mid()) / whole) if curve.moves and whole else 1
-            own = field.with_values(part.values)
-            for lo, hi in _equal(ceiling(part.length), pieces):
-                found = own.hull([(lo, hi)] if own.variables else [])
+            own, length = field.with_values(part.values), ceiling(part.length)
+            for lo, hi in pairwise([*(length * k / pieces for k in range(pieces)), length]):
+                found = iter(own.hull([(lo, hi)] if own.variables else []))
                 time = part.start + between(lo, hi) if timed else None
-                yield Window(found[:n], found[n : n + m], found[n + m : 2 * n + m], found[2 * n + m :], time)
+                x, u, speed, steepness = (list(islice(found, size)) for size in (n, m, n, m))
+                yield Window(x, u, speed, steepness, time)
 
-    def _cells(self, count: int) -> Iterator[Window]:
+    def _cells(self, family: AnyPlan, count: int) -> Iterator[Window]:
         """A grid in what the derivatives of F depend on; x*' is F(x*, u*) within the defect."""
-        family, plant = self.family, self.spec.plant
-        assert family is not None
-        named = [*plant.states, *plant.inputs]
-        ends = {**family.x, **family.u}
-        F = [row[0] for row in field_of(self.spec)]
-        bent = names(slope for name in named for slope in slopes(F, name))
-        split = [name for name in named if name in bent and ends[name][0] < ends[name][1]]
+        n, ends = len(self.spec.plant.states), {**family.x, **family.u}
+        bent = names(slope for name in self.names for slope in slopes(self.F, name))
+        split = [name for name in self.names if name in bent and ends[name][0] < ends[name][1]]
         parts = max(1, int(count ** (1 / len(split)) + 1e-9)) if split else 1
-        grid = [
-            [(a + (b - a) * k / parts, a + (b - a) * (k + 1) / parts) for k in range(parts)]
-            if name in split
-            else [(a, b)]
-            for name in named
-            for a, b in [ends[name]]
-        ]
-        known = Field(F)
-        reach = exact(family.defect)
+        grid = []
+        for name in self.names:
+            (a, b), pieces = ends[name], parts if name in split else 1
+            own = [exact(a + (b - a) * k / pieces) for k in range(pieces + 1)]
+            grid.append([between(low, high) for low, high in pairwise(own)])
+        field, missed = Field(self.F), arb(0, exact(family.defect))
         rates = [arb(0, exact(rate)) for rate in family.input_rate or ()]
-        for sides in product(*grid):
-            balls = [between(exact(a), exact(b)) for a, b in sides]
-            values = dict(zip(named, balls, strict=True))
-            own = known.hull([(floor(values[v]), ceiling(values[v])) for v in known.variables])
-            speed = [x + arb(0, reach) for x in own]
-            yield Window(balls[: len(plant.states)], balls[len(plant.states) :], speed, rates, None)
+        for cell in product(*grid):
+            values = dict(zip(self.names, cell, strict=True))
+            own = field.hull([(floor(values[v]), ceiling(values[v])) for v in field.variables])
+            yield Window(cell[:n], cell[n:], [x + missed for x in own], rates, None)
 
-    # -- how the plan's input is held, and how far the plan is from a motion
+    # -- how far the plan is from a motion, and how its input is held
+
+    def defect(self) -> list[Ball]:
+        """sup |x*_i' - F_i(x*, u*, p0)|, (n,), and |F_i| where the plan rests."""
+        if self.family is not None:
+            return [exact(self.family.defect)] * len(self.curve.x)
+        along = dict(zip(self.names, (*self.curve.x, *self.curve.u), strict=True))
+        missed = [f - e for f, e in zip(replaced(self.F, along), self.curve.slope, strict=True)]
+        found = [arb(0) if self.knots is None and vanish([e]) else self._supremum(e) for e in missed]
+        if self.spec.afterwards != "rest":
+            return found
+        x, u = self._end
+        return tops([found, Program(self.F, self.names).run([*x, *u])])
+
+    def _supremum(self, term: Term) -> Ball:
+        """sup |term| along the plan: the piece of it with the largest bound is halved, again and again."""
+        parts = self.curve.parts
+        whole = Field([term], parts[0].values)
+
+        def piece(k: int, lo: float, hi: float) -> tuple[float, int, float, float]:
+            own = whole.with_values(parts[k].values)
+            (found,) = own.hull([(lo, hi)] if own.variables else [])
+            return -ceiling(found.abs_upper()), k, lo, hi
+
+        pieces = [piece(k, 0.0, ceiling(part.length)) for k, part in enumerate(parts)]
+        heapify(pieces)
+        for _ in range(_HALVINGS):
+            _, k, lo, hi = pieces[0]
+            middle = 0.5 * lo + 0.5 * hi
+            heapreplace(pieces, piece(k, lo, middle))
+            heappush(pieces, piece(k, middle, hi))
+        return arb(-pieces[0][0])
 
     def held(self, windows: Sequence[Window]) -> list[Ball]:
         """sup |u*_j - ubar_j| while a command acts, (m,), without rounding."""
         machine, m = self.spec.hardware, len(self.spec.plant.inputs)
-        if machine.hold == "continuous":
-            return [arb(0)] * m
         span = machine.sample_time if machine.hold == "left" else machine.sample_time / 2
-        if self.knots is not None and self.knots.held:
-            return [exact(self._jumps(j, span)) for j in range(m)]
-        if self.family is not None and self.family.input_rate is None:
+        if machine.hold == "continuous" or (self.family is not None and not self.smooth):
             return [arb(0)] * m
-        return [exact(span) * most(own.steepness[j] for own in windows) for j in range(m)]
+        if self.knots is not None and self.knots.held:
+            return [exact(self._jumps(j, span, self.knots)) for j in range(m)]
+        return [exact(span) * rate for rate in tops(own.steepness for own in windows)]
 
-    def _jumps(self, j: int, span: Fraction) -> Fraction:
+    def _jumps(self, j: int, span: Fraction, knots: Knots) -> Fraction:
         """The most that u*_j, held between knots, jumps within a time; 0 if only where commands begin to act.
 
         At the left end of an interval the computer's time may be that of the interval before.
         """
-        assert self.knots is not None
-        t, machine = self.knots.t, self.spec.hardware
-        horizon = self.spec.trajectory.horizon
-        values = [row[j] for row in self.knots.u[:-1]]
-        jumps = [(at, abs(b - a)) for at, a, b in zip(t[1:-1], values, values[1:], strict=False)]
-        if self.spec.afterwards == "repeat" and horizon is not None:
+        t, machine, values = knots.t, self.spec.hardware, [row[j] for row in knots.u[:-1]]
+        jumps = [(at, abs(b - a)) for at, (a, b) in zip(t[1:-1], pairwise(values), strict=True)]
+        if self.spec.afterwards == "repeat":
             jumps.append((t[-1], abs(values[0] - values[-1])))
-            jumps += [(at + horizon, size) for at, size in jumps]
+            jumps += [(at + t[-1], size) for at, size in jumps]
         jumps = [(at, size) for at, size in jumps if size]
         rest = machine.delay % machine.sample_time
-        aligned = all(((at - rest) / machine.sample_time).denominator == 1 for at, _ in jumps)
-        if machine.hold == "middle" and aligned:
+        if machine.hold == "middle" and all(
+            ((at - rest) / machine.sample_time).denominator == 1 for at, _ in jumps
+        ):
             return Fraction(0)
         reach = span * Fraction(1001, 1000)
-        return max(
-            (
-                sum((s for at, s in jumps if begin <= at <= begin + reach), start=Fraction(0))
-                for begin, _ in jumps
-            ),
-            default=Fraction(0),
-        )
-
-    def defect(self, count: int) -> list[Ball]:
-        """sup |x*_i' - F_i(x*, u*, p0)|, (n,), and |F_i| where the plan rests."""
-        n = len(self.spec.plant.states)
-        if self.family is not None:
-            return [exact(self.family.defect)] * n
-        names_ = (*self.spec.plant.states, *self.spec.plant.inputs)
-        along = dict(zip(names_, (*self.curve.x, *self.curve.u), strict=True))
-        F = [row[0] for row in matrix_replaced(field_of(self.spec), along)]
-        missed = [f - slope for f, slope in zip(F, self.curve.slope, strict=True)]
-        left = [i for i, e in enumerate(missed) if self.knots is not None or not vanish([e])]
-        found = [arb(0)] * n
-        if left:
-            for i, top in zip(left, self._supremum([missed[i] for i in left], count), strict=True):
-                found[i] = top
-        if self.spec.afterwards == "rest":
-            x, u = self._end
-            resting = Program([row[0] for row in field_of(self.spec)], names_).run([*x, *u])
-            found = [x.max(y.abs_upper()) for x, y in zip(found, resting, strict=True)]
-        return found
-
-    def _supremum(self, terms: Sequence[Term], count: int) -> list[Ball]:
-        """sup |term| along the plan, each: windows are halved where that may make it smaller."""
-        whole = Field(terms, self.curve.parts[0].values)
-        parts, done = self.curve.parts, [arb(0)] * len(terms)
-        each = max(1, count // len(parts))
-        waiting = [(part, *ends) for part in parts for ends in _equal(ceiling(part.length), each)]
-        least, left = [0.0] * len(terms), _REFINED * len(waiting)
-        while waiting:
-            tops: list[list[Ball]] = []
-            for part, lo, hi in waiting:
-                own = whole.with_values(part.values)
-                tops.append([x.abs_upper() for x in own.hull([(lo, hi)] if own.variables else [])])
-                middle = own.at([arb(0.5 * lo + 0.5 * hi)] if own.variables else [])
-                least = [max(a, float(x.abs_lower())) for a, x in zip(least, middle, strict=True)]
-            left -= len(waiting)
-            enough = [_SHARP * a + _MEANS_NOTHING for a in least]
-            later: list[tuple[Part, float, float]] = []
-            for (part, lo, hi), top in zip(waiting, tops, strict=True):
-                at = 0.5 * lo + 0.5 * hi
-                if left <= 0 or not lo < at < hi or all(x <= e for x, e in zip(top, enough, strict=True)):
-                    done = [a.max(x) for a, x in zip(done, top, strict=True)]
-                else:
-                    later += [(part, lo, at), (part, at, hi)]
-            waiting = later
-        return done
+        nearby = ([size for at, size in jumps if begin <= at <= begin + reach] for begin, _ in jumps)
+        return max((sum(own, start=Fraction(0)) for own in nearby), default=Fraction(0))
 
 
-def most(values: Iterator[Ball] | Sequence[Ball]) -> Ball:
-    """The largest magnitude; what is not a number stays so."""
-    found = arb(0)
-    for x in values:
-        found = found.max(x.abs_upper())
-    return found
+def tops(rows: Iterable[Sequence[Ball]]) -> list[Ball]:
+    """The largest magnitudes, column by column; what is not a number stays so."""
+    return [reduce(arb.max, (x.abs_upper() for x in own)) for own in zip(*rows, strict=True)]
 
 
-def _equal(length: float, pieces: int) -> Iterator[tuple[float, float]]:
-    """[0, length] in pieces."""
-    ends = [length * k / pieces for k in range(pieces)] + [length]
-    return pairwise(ends)
-
-
-def field_of(spec: SampledSpecification) -> list[list[Term]]:
-    """F(x, u, p0) = f + B u of the middles of parameters, (n, 1)."""
-    return plus(upright(spec.plant.f), times(spec.plant.B, [[variable(name)] for name in spec.plant.inputs]))
+def driven(drift: Sequence[Term], gains: Matrix, inputs: Sequence[str]) -> list[Term]:
+    """f + B u, (n,)."""
+    return [row[0] for row in plus(upright(drift), times(gains, [[variable(name)] for name in inputs]))]
 
 
 def course_of(spec: SampledSpecification, plan: Plan) -> Course:
@@ -265,16 +248,6 @@ def course_of(spec: SampledSpecification, plan: Plan) -> Course:
     if isinstance(trajectory, Expressed):
         return Course(spec, expressed(trajectory.x, trajectory.u, TIME, trajectory.horizon), None)
     knots = knots_of(plan, trajectory.between, trajectory.horizon)
-    drift = [row[0] for row in field_of(spec)]
+    drift = driven(plant.f, plant.B, plant.inputs)
     curve = hermite(knots, drift, plant.states, plant.inputs, trajectory.horizon)
     return Course(spec, curve, knots)
-
-
-def times_of(course: Course) -> list[Ball]:
-    """Parts of the times at which h may be met where the plan's own time is not that of h: a period, or all of it."""
-    given = course.spec.uncertainty
-    terms = given.h or ()
-    if TIME not in names(terms):
-        return [arb(0)]
-    length = exact(course.horizon) if course.horizon is not None else common_period(terms).ball
-    return [length * between(arb(k) / _PARTS, arb(k + 1) / _PARTS) for k in range(_PARTS)]
