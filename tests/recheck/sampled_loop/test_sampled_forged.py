@@ -110,6 +110,13 @@ def test_a_lie_is_not_confirmed(name):
     assert why_not(changed(document, *path, to=to))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("ends", [("-0.9", "3"), ("-3", "0.9")])
+def test_limits_that_are_told_twice_are_kept_on_both_sides(ends):
+    lie = changed(made(SCALAR), "inputs", 0, "limits", to=list(map(float, ends)))
+    assert why_not(changed(lie, *spec("limits", "u"), to=list(ends)))
+
+
 def retold(text: str, before: str, after: str, *, slow: bool = True) -> dict:
     """The proof of an easier question, told as one of a harder one."""
     document, easier = made(text), made(text.replace(before, after), base=text, slow=slow)

@@ -1,13 +1,15 @@
 """The sums of the checker against the worst that signals do: an oracle in floats that shares nothing with it."""
 
 import json
+from collections import namedtuple
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from flint import arb, arb_mat, ctx
-from sampled_files import SCALAR
+from sampled_files import SCALAR, SWING
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
@@ -21,11 +23,12 @@ from tubecert.recheck.sampled_loop.obstacles import _apart
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.remainders import Size, Slow
 from tubecert.recheck.sampled_loop.rows import Ground, Problem
-from tubecert.recheck.sampled_loop.windows import course_of
+from tubecert.recheck.sampled_loop.windows import Course, course_of
 from tubecert.recheck.specification import read_sampled_specification
 from tubecert.spec import load_text
 from tubecert.spec.canonical import canonical
 
+Knots = namedtuple("Knots", "t u")
 FINE = 12  # parts of a sample, of which whole numbers are late
 SAMPLE = Fraction(1, 4)
 
@@ -230,3 +233,15 @@ def test_a_plan_of_a_family_moves_as_the_plant_does_and_by_its_defect():
     assert window.steepness[0].contains(arb(0, 3))
     assert course.held([window])[0] >= arb("0.15").lower()
     assert course.defect()[0].contains(arb("0.25"))
+
+
+def test_inputs_that_jump_between_knots():
+    """Up at .95, up again at 1.02, across the end; and jumps where commands begin to act."""
+    text = SWING.replace("rate: 10, delay: one sample, hold: left", "rate: 5")
+    spec = read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
+    t, u = ("0", "0.02", "0.3", "0.67", "0.95", "1"), (0, 1, 0, -1, 0, 0)
+    for times, rows, most in ((t, u, 2), (("0", "0.2", "0.4", "0.6", "0.8", "1"), (0, 1, 0, 1, 0, 0), 0)):
+        knots = Knots(tuple(map(Fraction, times)), tuple((Fraction(x),) for x in rows))
+        assert Course(spec, None, knots)._jumps(0, Fraction(1, 10), knots) == most
+    left = replace(spec, hardware=replace(spec.hardware, hold="left"))
+    assert Course(left, None, knots)._jumps(0, Fraction(1, 5), knots) == 2
