@@ -6,12 +6,13 @@ sqrt(c'Wc) of x*(t) in every direction c; an obstacle is a disc, or the edges of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from itertools import chain, pairwise
 from math import isfinite
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor, root
+from tubecert.recheck.clock import time_is_up
 from tubecert.recheck.cover import Outcome, prove
 from tubecert.recheck.curve import Curve, Segment
 from tubecert.recheck.metric import CONFIRMED, stated, together
@@ -21,6 +22,7 @@ from tubecert.recheck.statements import NotNegative
 from tubecert.recheck.terms import number
 
 _TURNS = 16  # directions in a quarter of a turn
+_ASKED = 64  # every so many segments the time is looked at
 
 
 def agrees(obstacles: Sequence[Obstacle], found: Sequence[Cleared]) -> Iterator[tuple[bool, str]]:
@@ -63,7 +65,7 @@ def keeps_away(place: Place, obstacle: Obstacle, own: Cleared, lower: Fraction) 
         return Outcome(
             verdict="undecided", why="the plan could not be shown to start outside of the obstacle"
         )
-    return test.along(place.curve.root, place.budget)
+    return along(place.curve.root, place.budget, test.clear)
 
 
 class _Test:
@@ -97,35 +99,36 @@ class _Test:
         x, y = (start[column] for column in self._columns)
         if not self._apart((x, x), (y, y), exact(0)):
             return False
-        middle = (_fraction(x), _fraction(y))
+        middle = (somewhere(x), somewhere(y))
         return self._obstacle.radius is not None or not contains(self._obstacle.corners, middle)
 
-    def along(self, whole: Segment, budget: int) -> Outcome:
-        """The least distance is kept over a segment, halved where that is needed."""
-        waiting = [whole]
-        for _ in range(budget):
-            if not waiting:
-                return CONFIRMED
-            segment = waiting.pop()
-            sides = [segment.x[column] for column in self._columns]
-            # a segment that is not bounded is halved
-            x, y = sides
-            if all(map(isfinite, chain(x, y))) and self._apart(_ends(x), _ends(y), self._least):
-                continue
-            halves = segment.halves
-            if not halves:
-                return Outcome(
-                    verdict="undecided", why="the clearance could not be shown at a time of the plan"
-                )
-            waiting.extend(halves)
-        return Outcome(verdict="undecided", why="the clearance could not be shown within the budget")
+    def clear(self, segment: Segment) -> bool:
+        """Whether the least distance is kept over a segment; not known of one without bounds."""
+        x, y = (segment.x[column] for column in self._columns)
+        return all(map(isfinite, chain(x, y))) and self._apart(_ends(x), _ends(y), self._least)
+
+
+def along(whole: Segment, budget: int, clear: Callable[[Segment], bool]) -> Outcome:
+    """Something is clear of a segment, or of its halves where that is needed."""
+    waiting = [whole]
+    for count in range(budget):
+        if not waiting:
+            return CONFIRMED
+        segment = waiting.pop()
+        if clear(segment):
+            continue
+        if not segment.halves or (count % _ASKED == 0 and time_is_up()):
+            why = f"the clearance could not be shown near t = {segment.when[0]:.6g}"
+            return Outcome(verdict="undecided", why=why)
+        waiting.extend(segment.halves)
+    return Outcome(verdict="undecided", why="the clearance could not be shown within the budget")
 
 
 def _ends(ends: tuple[float, float]) -> tuple[Ball, Ball]:
     return exact(Fraction(ends[0])), exact(Fraction(ends[1]))
 
 
-def _fraction(x: Ball) -> Fraction:
+def somewhere(x: Ball) -> Fraction:
     """A number in the ball."""
     low, high = floor(x), ceiling(x)
     return (Fraction(low) + Fraction(high)) / 2

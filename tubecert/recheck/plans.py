@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 
-from tubecert.recheck.document import Node
+from tubecert.recheck.document import Members, Node
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.numbers import Numbers, Rows
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting, Tabled
@@ -40,7 +42,7 @@ def read_plan(node: Node, specification: Specification) -> Plan:
     if isinstance(specification.trajectory, Tabled):
         optional += ["file", "file_hash"]
     own = node.closed("kind", optional=optional)
-    knots = own.get("knots", lambda item: _knots(item, n, m))
+    knots = own.get("knots", lambda item: read_knots(item.closed("t", "x", "u"), n, m, Node.exact))
     if "interpolation" in own:
         own.require(*optional)
     return Plan(
@@ -55,11 +57,11 @@ def read_plan(node: Node, specification: Specification) -> Plan:
     )
 
 
-def _knots(node: Node, n: int, m: int) -> Knots:
-    own = node.closed("t", "x", "u")
-    t = own["t"].exacts()
+def read_knots(own: Members, n: int, m: int, reads: Callable[[Node], Fraction]) -> Knots:
+    """`t`, `x` and `u` of an object, row by row."""
+    t = tuple(map(reads, own["t"].entries()))
     x, u = (
-        tuple(tuple(e.exact() for e in row) for row in own[key].rows(len(t), size))
+        tuple(tuple(map(reads, row)) for row in own[key].rows(len(t), size))
         for key, size in (("x", n), ("u", m))
     )
     return Knots(t, x, u)

@@ -19,7 +19,7 @@ from tubecert.recheck.sampled_loop.conditions import Inequalities, phases_of
 from tubecert.recheck.sampled_loop.exponential import column, joined, sizes
 from tubecert.recheck.sampled_loop.loop import Loop
 from tubecert.recheck.sampled_loop.obstacles import cleared
-from tubecert.recheck.sampled_loop.record import Certificate, Floats, InputUse, Proven, Result
+from tubecert.recheck.sampled_loop.record import Certificate, InputUse, Proven, Result
 from tubecert.recheck.sampled_loop.remainders import PLAN, Remainders, Size, Slow
 from tubecert.recheck.sampled_loop.rows import Ground, Problem
 from tubecert.recheck.sampled_loop.windows import Course, course_of
@@ -54,7 +54,7 @@ def _of_certified(case: Case) -> Iterator[Claim]:
     outputs = [
         *(f"|{name} - {name}*| inside the tube" for name in spec.plant.states),
         *(f"what is added to {name}" for name in spec.plant.inputs),
-        *(f"memory {j + 1} of the controller" for j in range(len(proven.tables.F))),
+        *(f"memory {j + 1} of the controller" for j in range(proven.F.nrows())),
     ]
     for f, name in enumerate(outputs):
         yield Claim(name, None, partial(case.output, f), ROWS)
@@ -72,14 +72,8 @@ def _first_wrong(statements: Iterator[tuple[bool, str]]) -> Outcome:
 
 
 def _repeated(result: Result) -> Iterator[tuple[bool, str]]:
-    spec = result.specification
-    yield result.effective_hash == spec.hash, "spec.effective_hash is not that of spec.effective"
-    for path, (given, own) in result.settings.items():
-        yield given == own, f"spec.settings.{path} is not what spec.effective has"
-    horizon = spec.trajectory.horizon if spec.afterwards == "nothing" else None
-    yield result.horizon == horizon, "claim.horizon is not that of the specification"
-    yield result.afterwards == spec.afterwards, "claim.afterwards is not that of the specification"
-    yield result.hold == spec.hardware.hold, "claim.hold is not that of the specification"
+    for path, (given, own) in result.repeated.items():
+        yield given == own, f"{path} is not what the specification has"
 
 
 def _follows(result: Result) -> Iterator[tuple[bool, str]]:
@@ -98,9 +92,8 @@ def _follows(result: Result) -> Iterator[tuple[bool, str]]:
 
 
 def _single(proven: Proven, controller: str) -> Outcome:
-    tables = proven.tables
-    flat = [x for table in (tables.F, tables.G, tables.M, tables.N) for row in table for x in row]
-    if controller == "none" and (tables.F or any(flat)):
+    flat = [float(x) for table in (proven.F, proven.G, proven.M, proven.N) for x in table.entries()]
+    if controller == "none" and (proven.F.nrows() or any(flat)):
         return stated(False, "there is a controller, and none was asked for")
     return stated(all(map(_is_single, flat)), "an entry is no number of single precision")
 
@@ -127,10 +120,8 @@ class Case:
     @cached_property
     def remainders(self) -> Remainders:
         """What is not linear."""
-        own, recipe = self.proven.nominal, self.proven.recipe
-        n, m = len(self._spec.plant.states), len(self._spec.plant.inputs)
-        nominal = _matrix(own.A, n, n), _matrix(own.B, n, m), _matrix(own.E, n, len(own.E[0]))
-        return Remainders(self.course, nominal, recipe.windows, slow=recipe.slow)
+        own, recipe = self.proven, self.proven.recipe
+        return Remainders(self.course, (own.A, own.B, own.E), recipe.windows, slow=recipe.slow)
 
     @cached_property
     def _slow(self) -> list[Slow]:
@@ -141,31 +132,21 @@ class Case:
     @cached_property
     def inequalities(self) -> Inequalities:
         """Of this loop."""
-        machine, proven, tables = self._spec.hardware, self.proven, self.proven.tables
-        n, m, z = len(self._spec.plant.states), len(self._spec.plant.inputs), len(tables.F)
-        loop = Loop(
-            A=_matrix(proven.nominal.A, n, n),
-            B=_matrix(proven.nominal.B, n, m),
-            H=arb_mat(n, len(self._slow), [own.column[i] for i in range(n) for own in self._slow]),
-            F=_matrix(tables.F, z, z),
-            G=_matrix(tables.G, z, n),
-            M=_matrix(tables.M, m, z),
-            N=_matrix(tables.N, m, n),
-            sample=machine.sample_time,
-            delay=machine.delay,
-        )
+        machine, own, n = self._spec.hardware, self.proven, len(self._spec.plant.states)
+        H = arb_mat(n, len(self._slow), [eta.column[i] for i in range(n) for eta in self._slow])
+        loop = Loop(own.A, own.B, H, own.F, own.G, own.M, own.N, machine.sample_time, machine.delay)
         noise, grounds = Size.of(machine.noise, n), []
-        for begin, stage, acting in phases_of(proven.stages, loop.shape[3]):
-            W, Z, U = (list(map(exact, own)) for own in (stage.half_widths, stage.memory, acting))
-            box = [*W, *Z, *U * loop.shape[3], *(own.size for own in self._slow)]
+        for begin, stage, acting in phases_of(own.stages, loop.shape[3]):
+            W, Z, U = (list(map(exact, sizes_)) for sizes_ in (stage.half_widths, stage.memory, acting))
+            box = [*W, *Z, *U * loop.shape[3], *(eta.size for eta in self._slow)]
             rho = self.remainders.rho(W, U, self._slow)
             grounds.append(Ground(begin, stage, rho, self._rounding(loop, noise, W, Z), box))
-        lags, intervals = proven.recipe.lags, self.course.intervals
-        last = proven.stages[-1].start + loop.whole + 1 + lags
+        lags, intervals = own.recipe.lags, self.course.intervals
+        last = own.stages[-1].start + loop.whole + 1 + lags
         last = last if intervals is None else min(last, intervals - 1)
         winds = self.remainders.sudden()
         problem = Problem(loop, noise, winds, self._slow, *self._start(), grounds, lags, last)
-        return Inequalities(problem, proven.recipe)
+        return Inequalities(problem, own.recipe)
 
     def _rounding(self, loop: Loop, noise: Size, W: Sequence[Ball], Z: Sequence[Ball]) -> list[Ball]:
         """What dy (n), u (m) and zeta (z) are off by, (D.8)."""
@@ -270,7 +251,3 @@ class Case:
 
 def _shown(holds: bool, why: str) -> Outcome:
     return CONFIRMED if holds else Outcome(verdict="undecided", why=why)
-
-
-def _matrix(rows: Floats, p: int, q: int) -> arb_mat:
-    return arb_mat(p, q, [arb(x) for row in rows for x in row])

@@ -94,11 +94,12 @@ def _data(certificate: Certificate, held: HeldPlan, xs: Rows, us: Rows) -> str:
     if result.verdict != "certified" or proven is None:
         raise ValueError("the certificate is not certified")
     machine, plant = result.specification.hardware, result.specification.plant
-    matrices = {**{name: getattr(proven.tables, name) for name in "FGMN"}, "xs": xs, "us": us}
+    matrices = {name: [list(map(float, row)) for row in getattr(proven, name).tolist()] for name in "FGMN"}
+    matrices |= {"xs": xs, "us": us}
     places: dict[str, object] = {
         **{name: "{" + ",\n".join(map(_array, rows or [[]])) + "}" for name, rows in matrices.items()},
         **{name: _array(own) for name, own in _limits(result, proven).items()},
-        **{"n": len(plant.states), "m": len(plant.inputs), "z": len(proven.tables.F)},
+        **{"n": len(plant.states), "m": len(plant.inputs), "z": proven.F.nrows()},
         **{"period": float(machine.sample_time), "delay": float(machine.delay), "lead": float(held.lead)},
         **{"kind": held.kind, "steps": held.steps, "after": held.after, "hash": certificate.hash},
         **{"rows": len(held.written), "formula_x": held.formula[0], "formula_u": held.formula[1]},

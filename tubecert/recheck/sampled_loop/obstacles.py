@@ -7,12 +7,9 @@ from fractions import Fraction
 from itertools import pairwise
 from math import inf, isfinite
 
-from tubecert.recheck.balls import ceiling, floor
-from tubecert.recheck.clearances import contains
-from tubecert.recheck.clock import time_is_up
+from tubecert.recheck.clearances import along, contains, somewhere
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import Segment
-from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.obstacles import Obstacle, Point
 from tubecert.recheck.sampled_loop.record import Stage
 from tubecert.recheck.sampled_loop.windows import Course
@@ -21,30 +18,19 @@ from tubecert.recheck.specified.numbers import Range
 
 def cleared(course: Course, obstacle: Obstacle, stages: Sequence[Stage], budget: int) -> Outcome:
     """No rectangle of a stage that may last at a segment meets the obstacle, and the plan starts outside of it."""
-    states = course.spec.plant.states
-    pair = [states.index(name) for name in obstacle.states]
-    start = [course.curve.somewhere()[i] for i in pair]
-    x, y = ((Fraction(floor(own)) + Fraction(ceiling(own))) / 2 for own in start)
+    pair = [course.spec.plant.states.index(name) for name in obstacle.states]
+    start = course.curve.somewhere()
+    x, y = (somewhere(start[i]) for i in pair)
     if obstacle.radius is None and contains(obstacle.corners, (x, y)):
         return Outcome(verdict="undecided", why="the plan starts in the obstacle")
-    waiting: list[Segment] = [course.curve.root]
-    for count in range(budget):
-        if not waiting:
-            return CONFIRMED
-        segment = waiting.pop()
-        widths = _widths(course, segment, stages)
-        sides = [segment.x[i] for i in pair]
-        if all(map(isfinite, (*sides[0], *sides[1]))):
-            box = [
-                (Fraction(low) - widths[i], Fraction(high) + widths[i])
-                for i, (low, high) in zip(pair, sides, strict=True)
-            ]
-            if _apart(obstacle, box):
-                continue
-        if not segment.halves or (count % 64 == 0 and time_is_up()):
-            return Outcome(verdict="undecided", why=f"the tube may meet it near t = {segment.when[0]:.6g}")
-        waiting.extend(segment.halves)
-    return Outcome(verdict="undecided", why="it could not be shown within the budget")
+
+    def clear(segment: Segment) -> bool:
+        widths, sides = _widths(course, segment, stages), [(i, *segment.x[i]) for i in pair]
+        return all(isfinite(low) and isfinite(high) for _, low, high in sides) and _apart(
+            obstacle, [(Fraction(low) - widths[i], Fraction(high) + widths[i]) for i, low, high in sides]
+        )
+
+    return along(course.curve.root, budget, clear)
 
 
 def _widths(course: Course, segment: Segment, stages: Sequence[Stage]) -> list[Fraction]:

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import pairwise
+from typing import TypeVar
+
+from flint import arb, arb_mat
 
 from tubecert.recheck.certificate import read_settings
 from tubecert.recheck.document import Members, Node, digest
-from tubecert.recheck.plans import Knots, Plan
+from tubecert.recheck.plans import Plan, read_knots
 from tubecert.recheck.specification import SampledSpecification, read_sampled_specification
 from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.specified.trajectory import Planned, Tabled
@@ -26,27 +29,7 @@ _MOST_LAGS = 50_000
 _MOST_START = 1_000_000  # samples before the last stage
 _MOST_STAGES = _MOST_MEMORY = _MOST_PARTS = 64
 _MOST_WINDOWS = 4_096
-
-Floats = tuple[tuple[float, ...], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Tables:
-    """F (z, z), G (z, n), M (m, z), N (m, n)."""
-
-    F: Floats
-    G: Floats
-    M: Floats
-    N: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class Nominal:
-    """A (n, n), B (n, m), E (n, k)."""
-
-    A: Floats
-    B: Floats
-    E: Floats
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,25 +70,29 @@ class InputUse:
 
 @dataclass(frozen=True, slots=True)
 class Proven:
-    """What a certified result rests on."""
+    """What a certified result rests on: A (n, n), B (n, m), E (n, k); tables F (z, z), G (z, n), M (m, z), N (m, n)."""
 
-    nominal: Nominal
-    tables: Tables
+    A: arb_mat
+    B: arb_mat
+    E: arb_mat
+    F: arb_mat
+    G: arb_mat
+    M: arb_mat
+    N: arb_mat
     stages: tuple[Stage, ...]
     recipe: Recipe
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What is claimed; `proven` is there where the verdict is certified."""
+    """What is claimed; `proven` is there where the verdict is certified.
+
+    `repeated`: by path what is stated a second time, and what it is.
+    """
 
     verdict: str
     specification: SampledSpecification
-    effective_hash: str
-    settings: dict[str, tuple[Fraction, Fraction]]
-    horizon: Fraction | None
-    afterwards: str
-    hold: str
+    repeated: dict[str, tuple[object, object]]
     plan: Plan
     proven: Proven | None
     inputs: tuple[InputUse, ...]
@@ -139,25 +126,37 @@ def read_result(node: Node) -> Result:
     spec = own["spec"].closed("effective", "effective_hash", "file_hash", optional=("settings",))
     spec["file_hash"].text()
     specification = read_sampled_specification(spec["effective"])
-    claim = own["claim"].closed("horizon", "afterwards", "hold")
-    verdict = own["verdict"].word(*VERDICTS)
-    if verdict == "certified":
+    if own["verdict"].word(*VERDICTS) == "certified":
         own.require(*parts)
-    proven = _proven(own, specification) if all(part in own for part in parts) else None
+    settings = spec.get("settings", lambda item: read_settings(item, spec["effective"])) or {}
     return Result(
-        verdict=verdict,
+        verdict=own["verdict"].text(),
         specification=specification,
-        effective_hash=spec["effective_hash"].text(),
-        settings=spec.get("settings", lambda item: read_settings(item, spec["effective"])) or {},
-        horizon=claim.known("horizon", Node.decimal),
-        afterwards=claim["afterwards"].word("nothing", "rest", "repeat"),
-        hold=claim["hold"].word("middle", "left", "continuous"),
+        repeated={
+            "spec.effective_hash": (spec["effective_hash"].text(), specification.hash),
+            **{f"spec.settings.{path}": pair for path, pair in settings.items()},
+            **_claim(own["claim"], specification),
+        },
         plan=_plan(own, specification),
-        proven=proven,
-        inputs=tuple(map(_input, own["inputs"].entries())) if "inputs" in own else (),
-        clearance=tuple(map(_cleared, own["clearance"].entries())) if "clearance" in own else (),
-        lacks=len(list(map(_lack, own["lacks"].entries()))) if "lacks" in own else 0,
+        proven=_proven(own, specification) if all(part in own for part in parts) else None,
+        inputs=_each(own, "inputs", _input),
+        clearance=_each(own, "clearance", _cleared),
+        lacks=len(_each(own, "lacks", _lack)),
     )
+
+
+def _each(own: Members, key: str, reads: Callable[[Node], T]) -> tuple[T, ...]:
+    return tuple(map(reads, own[key].entries())) if key in own else ()
+
+
+def _claim(node: Node, spec: SampledSpecification) -> dict[str, tuple[object, object]]:
+    own = node.closed("horizon", "afterwards", "hold")
+    horizon = spec.trajectory.horizon if spec.afterwards == "nothing" else None
+    return {
+        "claim.horizon": (own.known("horizon", Node.decimal), horizon),
+        "claim.afterwards": (own["afterwards"].word("nothing", "rest", "repeat"), spec.afterwards),
+        "claim.hold": (own["hold"].word("middle", "left", "continuous"), spec.hardware.hold),
+    }
 
 
 def _proven(own: Members, spec: SampledSpecification) -> Proven:
@@ -169,25 +168,23 @@ def _proven(own: Members, spec: SampledSpecification) -> Proven:
     if z > _MOST_MEMORY:
         raise tables["F"].refused(f"has more than {_MOST_MEMORY} rows")
     return Proven(
-        nominal=Nominal(
-            _floats(nominal["A"], n, n), _floats(nominal["B"], n, m), _floats(nominal["E"], n, k)
-        ),
-        tables=Tables(
-            _floats(tables["F"], z, z),
-            _floats(tables["G"], z, n),
-            _floats(tables["M"], m, z),
-            _floats(tables["N"], m, n),
-        ),
+        A=_matrix(nominal["A"], n, n),
+        B=_matrix(nominal["B"], n, m),
+        E=_matrix(nominal["E"], n, k),
+        F=_matrix(tables["F"], z, z),
+        G=_matrix(tables["G"], z, n),
+        M=_matrix(tables["M"], m, z),
+        N=_matrix(tables["N"], m, n),
         stages=_stages(own["tube"], spec, z),
         recipe=_recipe(own["recipe"], n + m + z),
     )
 
 
-def _floats(node: Node, p: int, q: int) -> Floats:
+def _matrix(node: Node, p: int, q: int) -> arb_mat:
     own = node.closed("columns", "rows")
     if own["columns"].count() != q:
         raise node.refused(f"has not {q} columns")
-    return tuple(tuple(map(_float, row)) for row in own["rows"].rows(p, q))
+    return arb_mat(p, q, [arb(_float(entry)) for row in own["rows"].rows(p, q) for entry in row])
 
 
 def _float(node: Node) -> float:
@@ -249,23 +246,16 @@ def _between(node: Node, least: int, most: int) -> int:
 
 def _plan(own: Members, spec: SampledSpecification) -> Plan:
     """The knots of a plan through knots, which no other plan may have."""
-    n, m, through = (
-        len(spec.plant.states),
-        len(spec.plant.inputs),
-        isinstance(spec.trajectory, (Planned, Tabled)),
+    kind, plant = spec.trajectory.kind, spec.plant
+    if "planned" not in own:
+        return Plan(kind, None, None, None, None, None)
+    if not isinstance(spec.trajectory, (Planned, Tabled)):
+        raise own["planned"].refused("is not known in this place")
+    part = own["planned"].closed("t", "x", "u", "interpolation")
+    knots = read_knots(part, len(plant.states), len(plant.inputs), Node.decimal)
+    return Plan(
+        kind, part["interpolation"].word("hold", "linear", "hermite-simpson"), None, knots, None, None
     )
-    interpolation = knots = None
-    if "planned" in own:
-        if not through:
-            raise own["planned"].refused("is not known in this place")
-        part = own["planned"].closed("t", "x", "u", "interpolation")
-        t = part["t"].decimals()
-        x, u = (
-            tuple(tuple(e.decimal() for e in row) for row in part[key].rows(len(t), size))
-            for key, size in (("x", n), ("u", m))
-        )
-        knots, interpolation = Knots(t, x, u), part["interpolation"].word("hold", "linear", "hermite-simpson")
-    return Plan(spec.trajectory.kind, interpolation, None, knots, None, None)
 
 
 def _input(node: Node) -> InputUse:

@@ -58,7 +58,11 @@ class Slow:
 
 
 class Remainders:
-    """The suprema of one plan with the matrices A (n, n), B (n, m), E (n, k) of the error equation."""
+    """The suprema of one plan with the matrices A (n, n), B (n, m), E (n, k) of the error equation.
+
+    Along the plan, in its `windows`: sup |x*_i| (n), sup |u*_j| (m); `held`: sup |u*_j - ubar_j| while a command acts
+    (m), with what a computer misses u* by.
+    """
 
     def __init__(
         self, course: Course, nominal: tuple[arb_mat, arb_mat, arb_mat], windows: int, *, slow: bool
@@ -66,56 +70,29 @@ class Remainders:
         self._course, self._spec, self._slow = course, course.spec, slow
         self._A, self._B, self._E = nominal
         self._n, self._m = self._B.nrows(), self._B.ncols()
-        self.windows = course.windows(windows)
-        plant, wind = self._spec.plant, self._spec.disturbance
+        plant, wind, h = self._spec.plant, self._spec.disturbance, self._spec.uncertainty
         self._names = (*course.names, *plant.ranges)
         self._parameters = [between(exact(a), exact(b)) for a, b in plant.ranges.values()]
         self._field = driven(plant.unknown or plant.f, plant.gained or plant.B, plant.inputs)
         blown = () if wind is None else (e for row in wind.E for e in row)
         self._slopes = Program([*_gradients(self._field, course.names), *blown], self._names)
-
-    # -- along the plan
-
-    @cached_property
-    def states_above(self) -> list[Ball]:
-        """sup |x*_i|, (n,)."""
-        return tops(own.x for own in self.windows)
-
-    @cached_property
-    def inputs_above(self) -> list[Ball]:
-        """sup |u*_j|, (m,)."""
-        return tops(own.u for own in self.windows)
-
-    @cached_property
-    def held(self) -> list[Ball]:
-        """sup |u*_j - ubar_j| while a command acts, (m,), with what a computer misses u* by."""
-        own = zip(self._course.held(self.windows), self.inputs_above, strict=True)
-        return [x + exact(PLAN) * above for x, above in own]
+        self._matched = [j for j in range(self._m) if h.h is None or h.h[j] is not NOUGHT]
+        self._jumps = (
+            h.h is None and not {"h_x", "h_t"} <= h.declared.keys()
+        )  # nothing bounds how fast h changes
+        self._gusts = Size([], length=False) if wind is None else Size.of(wind.bound, self._E.ncols())
+        self.windows = course.windows(windows)
+        self.states_above = tops(own.x for own in self.windows)
+        self.inputs_above = tops(own.u for own in self.windows)
+        jumps = zip(course.held(self.windows), self.inputs_above, strict=True)
+        self.held = [x + exact(PLAN) * above for x, above in jumps]
 
     @cached_property
     def _defect(self) -> list[Ball]:
         """sup |x*_i' - F_i(x*, u*, p0)|, (n,)."""
         return self._course.defect()
 
-    # -- signals that may jump
-
-    @cached_property
-    def _matched(self) -> list[int]:
-        """The inputs beside which an h acts."""
-        h = self._spec.uncertainty.h
-        return [j for j in range(self._m) if h is None or h[j] is not NOUGHT]
-
-    @property
-    def _jumps(self) -> bool:
-        """Whether h may jump: nothing bounds how fast it changes."""
-        given = self._spec.uncertainty
-        return given.h is None and not {"h_x", "h_t"} <= given.declared.keys()
-
-    @cached_property
-    def _gusts(self) -> Size:
-        """Of w."""
-        wind = self._spec.disturbance
-        return Size([], length=False) if wind is None else Size.of(wind.bound, self._E.ncols())
+    # -- signals
 
     def sudden(self) -> list[tuple[arb_mat, Size]]:
         """What may jump: columns (n, k) and its size."""
@@ -125,8 +102,6 @@ class Remainders:
         if self._jumps:
             found.append((self._B, Size.of(self._spec.uncertainty.declared["h"], self._m)))
         return found
-
-    # -- slow signals
 
     def slow(self, W: Sequence[Ball]) -> list[Slow]:
         """The components of eta, of which h is met where |e| <= W: h, a wind with a rate, parameters."""
