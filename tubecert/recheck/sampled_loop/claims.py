@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property, partial
 
 from flint import arb, arb_mat
 
-from tubecert.recheck import planned
 from tubecert.recheck.balls import Ball, exact
-from tubecert.recheck.cover import Outcome, Range
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.cover import Range as Ends
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.metric import CONFIRMED, smooth, stated, together
+from tubecert.recheck.planned import serves
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.sampled_loop.conditions import Inequalities, phases_of
 from tubecert.recheck.sampled_loop.exponential import column, joined, sizes
+from tubecert.recheck.sampled_loop.held import single
 from tubecert.recheck.sampled_loop.loop import Loop
 from tubecert.recheck.sampled_loop.obstacles import cleared
 from tubecert.recheck.sampled_loop.record import Certificate, InputUse, Proven, Result
 from tubecert.recheck.sampled_loop.remainders import PLAN, Remainders, Size, Slow
 from tubecert.recheck.sampled_loop.rows import Ground, Problem
 from tubecert.recheck.sampled_loop.windows import Course, course_of
+from tubecert.recheck.specified.numbers import Range
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 from tubecert.recheck.times import time_range
 
@@ -36,7 +38,11 @@ def of(certificate: Certificate, budget: int) -> Iterator[Claim]:
     """Every claim; of a result that is not certified, only that it is what was written, for this specification."""
     same, result = certificate.stated_hash == certificate.hash, certificate.result
     yield Claim("the hash is that of the result", None, lambda: stated(same, "something was changed"))
-    yield Claim("the specification and what repeats it", None, lambda: _first_wrong(_repeated(result)))
+    repeated = (
+        (given == own, f"{path} is not what the specification has")
+        for path, (given, own) in result.repeated.items()
+    )
+    yield Claim("the specification and what repeats it", None, lambda: _first_wrong(repeated))
     if result.verdict == "certified" and result.proven is not None:
         yield from _of_certified(Case(result, result.proven, budget))
 
@@ -71,11 +77,6 @@ def _first_wrong(statements: Iterator[tuple[bool, str]]) -> Outcome:
     return next((stated(False, why) for holds, why in statements if not holds), CONFIRMED)
 
 
-def _repeated(result: Result) -> Iterator[tuple[bool, str]]:
-    for path, (given, own) in result.repeated.items():
-        yield given == own, f"{path} is not what the specification has"
-
-
 def _follows(result: Result) -> Iterator[tuple[bool, str]]:
     spec = result.specification
     yield not result.lacks, "something is lacking"
@@ -95,14 +96,7 @@ def _single(proven: Proven, controller: str) -> Outcome:
     flat = [float(x) for table in (proven.F, proven.G, proven.M, proven.N) for x in table.entries()]
     if controller == "none" and (proven.F.nrows() or any(flat)):
         return stated(False, "there is a controller, and none was asked for")
-    return stated(all(map(_is_single, flat)), "an entry is no number of single precision")
-
-
-def _is_single(x: float) -> bool:
-    try:
-        return bool(struct.unpack("<f", struct.pack("<f", x))[0] == x)
-    except OverflowError:
-        return False
+    return stated(all(single(x) == x for x in flat), "an entry is no number of single precision")
 
 
 class Case:
@@ -150,18 +144,11 @@ class Case:
 
     def _rounding(self, loop: Loop, noise: Size, W: Sequence[Ball], Z: Sequence[Ball]) -> list[Ball]:
         """What dy (n), u (m) and zeta (z) are off by, (D.8)."""
-        u, k, own = (
-            _ROUNDING[self._spec.hardware.arithmetic],
-            loop.shape[2] + loop.shape[0] + 3,
-            self.remainders,
-        )
-        gamma, lost, states = (
-            exact(k * u / (1 - k * u)),
-            exact(_FLUSHED),
-            zip(own.states_above, W, noise.each, strict=True),
-        )
+        own, u, k = self.remainders, _ROUNDING[self._spec.hardware.arithmetic], sum(loop.shape[:3:2]) + 3
+        gamma, lost = exact(k * u / (1 - k * u)), exact(_FLUSHED)
         measured = [
-            (exact(PLAN) * x + exact(2 * u) * (2 * x + w + s)) * exact(_SECOND) + lost for x, w, s in states
+            (exact(PLAN) * x + exact(2 * u) * (2 * x + w + s)) * exact(_SECOND) + lost
+            for x, w, s in zip(own.states_above, W, noise.each, strict=True)
         ]
         seen = [w + s + y for w, s, y in zip(W, noise.each, measured, strict=True)]
         told = sizes(joined([[loop.M, loop.N], [loop.F, loop.G]])) * column([*Z, *seen])
@@ -183,7 +170,7 @@ class Case:
         """The knots are those of its task, and the plan goes on as is said."""
         trajectory = self._spec.trajectory
         if isinstance(trajectory, Planned):
-            found = planned.serves(trajectory, self.result.plan)
+            found = serves(trajectory, self.result.plan)
             if not found.holds:
                 return found
         why = self.course.lasts()
@@ -194,7 +181,7 @@ class Case:
         spec, trajectory = self._spec, self._spec.trajectory
         time = time_range(spec.uncertainty, self.course.horizon)
         wind = () if spec.disturbance is None else spec.disturbance.duties
-        ranges: dict[str, Range] = {**spec.plant.safe_set, **spec.plant.ranges}
+        ranges: dict[str, Ends] = {**spec.plant.safe_set, **spec.plant.ranges}
         if time is not None:
             ranges[TIME] = time
         duties = (*spec.plant.duties, *wind, *spec.uncertainty.duties)
@@ -206,21 +193,22 @@ class Case:
     def fits(self) -> Outcome:
         """Cuts are there for every slow signal, and signals that are taken for slow have a rate."""
         signals = len(self._slow)
-        rows = all(len(row) == signals for row in self.proven.recipe.cuts)
-        if not rows:
+        if any(len(row) != signals for row in self.proven.recipe.cuts):
             return stated(False, f"there are {signals} slow signals, and cuts of another number")
         return stated(self.remainders.has_rates, "u* jumps, so that parameters are not slow")
 
     def inside(self, i: int) -> Outcome:
         """The tube of a state lies in the safe set."""
         W = exact(max(own.half_widths[i] for own in self.proven.stages))
-        return _shown(self.remainders.inside(i, W), "it could not be shown")
+        ends = list(self._spec.plant.safe_set.values())[i]
+        return _within(ends, [own.x[i] for own in self.remainders.windows], W)
 
     def known(self) -> Outcome:
         """All that acts on the loop is bounded."""
         grounds = self.inequalities.problem.grounds
-        finite = all(x.is_finite() for own in grounds for x in (*own.acting, *own.box))
-        return _shown(finite, "a supremum is not finite")
+        if all(x.is_finite() for own in grounds for x in (*own.acting, *own.box)):
+            return CONFIRMED
+        return Outcome(verdict="undecided", why="a supremum is not finite")
 
     def output(self, f: int) -> Outcome:
         """|e_i| < W_i at all times; |delta_j| < U_j, and zeta in its box, at every sample."""
@@ -231,9 +219,7 @@ class Case:
         j = self._spec.plant.inputs.index(own.name)
         more = exact(max(stage.deviations[j] for stage in self.proven.stages))
         more += exact(PLAN) * self.remainders.inputs_above[j]
-        low, high = map(exact, own.range)
-        planned_ = [own.u[j] for own in self.remainders.windows]
-        return _shown(all(low <= u - more and u + more <= high for u in planned_), "it may leave it")
+        return _within(own.range, [window.u[j] for window in self.remainders.windows], more)
 
     def cleared(self, index: int) -> Outcome:
         """The tube keeps away from an obstacle."""
@@ -249,5 +235,8 @@ class Case:
         return stated(max(widths) <= wish, "it is wider")
 
 
-def _shown(holds: bool, why: str) -> Outcome:
-    return CONFIRMED if holds else Outcome(verdict="undecided", why=why)
+def _within(ends: Range, planned: Sequence[Ball], more: Ball) -> Outcome:
+    low, high = map(exact, ends)
+    if all(low <= x - more and x + more <= high for x in planned):
+        return CONFIRMED
+    return Outcome(verdict="undecided", why="it may leave it")

@@ -240,12 +240,6 @@ class Remainders:
             (sizes(self._steep(_wider(own.x, W), time)) * away).entries() for own, time in self._timed
         )
 
-    def inside(self, i: int, W: Ball) -> bool:
-        """Whether the tube of a state stays in the safe set."""
-        low, high = list(self._spec.plant.safe_set.values())[i]
-        sides = [_wider([own.x[i]], [W])[0] for own in self.windows]
-        return all(exact(low) <= x <= exact(high) for x in sides)
-
 
 def _gradients(rows: Sequence[Term], by: Sequence[str]) -> list[Term]:
     """The slopes of every row, row by row."""
