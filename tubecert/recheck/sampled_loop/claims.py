@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property, partial
+from math import ceil
 
 from flint import arb, arb_mat
 
@@ -135,11 +136,11 @@ class Case:
             box = [*W, *Z, *U * loop.shape[3], *(eta.size for eta in self._slow)]
             rho = self.remainders.rho(W, U, self._slow)
             grounds.append(Ground(begin, stage, rho, self._rounding(loop, noise, W, Z), box))
-        lags, intervals = own.recipe.lags, self.course.intervals
-        last = own.stages[-1].start + loop.whole + 1 + lags
-        last = last if intervals is None else min(last, intervals - 1)
+        last, horizon = own.stages[-1].start + loop.whole + 1 + own.recipe.lags, self.course.horizon
+        if horizon is not None:
+            last = min(last, ceil(horizon / machine.sample_time) - 1)
         winds = self.remainders.sudden()
-        problem = Problem(loop, noise, winds, self._slow, *self._start(), grounds, lags, last)
+        problem = Problem(loop, noise, winds, self._slow, *self._start(), grounds, own.recipe.lags, last)
         return Inequalities(problem, own.recipe)
 
     def _rounding(self, loop: Loop, noise: Size, W: Sequence[Ball], Z: Sequence[Ball]) -> list[Ball]:

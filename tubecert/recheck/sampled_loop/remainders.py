@@ -76,10 +76,15 @@ class Remainders:
         self._field = driven(plant.unknown or plant.f, plant.gained or plant.B, plant.inputs)
         blown = () if wind is None else (e for row in wind.E for e in row)
         self._slopes = Program([*_gradients(self._field, course.names), *blown], self._names)
-        self._matched = [j for j in range(self._m) if h.h is None or h.h[j] is not NOUGHT]
-        self._jumps = (
-            h.h is None and not {"h_x", "h_t"} <= h.declared.keys()
-        )  # nothing bounds how fast h changes
+        strange = enumerate(f - known for f, known in zip(self._field, course.F, strict=True))
+        self._strange = {i: e for i, e in strange if not names([e]).isdisjoint(plant.ranges)}  # 0 at p0
+        self._h, timed = h.h or (), (*plant.states, TIME)
+        self._sizes_of_h = Program(self._h, timed)
+        self._slopes_of_h = Program(_gradients(self._h, timed), timed)
+        # whether nothing bounds how fast h changes; else the inputs beside which it acts
+        self._jumps = h.h is None and not {"h_x", "h_t"} <= h.declared.keys()
+        own = [] if self._jumps else range(self._m)
+        self._matched = [j for j in own if h.h is None or h.h[j] is not NOUGHT]
         self._gusts = Size([], length=False) if wind is None else Size.of(wind.bound, self._E.ncols())
         self.windows = course.windows(windows)
         self.states_above = tops(own.x for own in self.windows)
@@ -123,27 +128,18 @@ class Remainders:
             return [Slow(own, size, fast + steep * speed[0], size) for own in columns]
         start = [own.x for own in self.windows] if self._course.family else [self._course.curve.somewhere()]
         found = (
-            tops(self._h.run([*_wider(own.x, W), time]) for own, time in self._timed),
+            tops(self._sizes_of_h.run([*_wider(own.x, W), time]) for own, time in self._timed),
             tops(
                 (self._steep(own.x, time) * column([*own.speed, arb(1)])).entries()
                 for own, time in self._timed
             ),
-            tops(self._h.run([*x, arb(0)]) for x in start),
+            tops(self._sizes_of_h.run([*x, arb(0)]) for x in start),
         )
         return [Slow(columns[j], *(own[j] for own in found)) for j in self._matched]
 
-    @cached_property
-    def _h(self) -> Program:
-        return Program(self._spec.uncertainty.h or (), (*self._spec.plant.states, TIME))
-
-    @cached_property
-    def _h_slopes(self) -> Program:
-        names_ = (*self._spec.plant.states, TIME)
-        return Program(_gradients(self._spec.uncertainty.h or (), names_), names_)
-
     def _steep(self, x: Sequence[Ball], time: Ball) -> arb_mat:
         """Slopes of h by states, then by t, (m, n + 1)."""
-        return arb_mat(self._m, self._n + 1, self._h_slopes.run([*x, time]))
+        return arb_mat(self._m, self._n + 1, self._slopes_of_h.run([*x, time]))
 
     @cached_property
     def _timed(self) -> list[tuple[Window, Ball]]:
@@ -151,25 +147,17 @@ class Remainders:
 
         Where the plan's own time is not that of h these are parts of a period, or of all of it.
         """
-        h, horizon = self._spec.uncertainty.h or (), self._course.horizon
-        parts = [arb(0)]
-        if TIME in names(h):
-            whole = exact(horizon) if horizon is not None else common_period(h).ball
+        parts, horizon = [arb(0)], self._course.horizon
+        if TIME in names(self._h):
+            whole = exact(horizon) if horizon is not None else common_period(self._h).ball
             parts = [whole * between(arb(k) / _PARTS, arb(k + 1) / _PARTS) for k in range(_PARTS)]
         anywhere = [own for own in self.windows if own.time is None]
-        if names(h).isdisjoint(self._spec.plant.states):
+        if names(self._h).isdisjoint(self._spec.plant.states):
             anywhere = anywhere[:1]
         found = [(own, own.time) for own in self.windows if own.time is not None]
         return [*found, *((own, time) for own in anywhere for time in parts)]
 
     # -- parameters
-
-    @cached_property
-    def _strange(self) -> dict[int, Term]:
-        """F_i(x, u, p) - F_i(x, u, p0) of the rows in which parameters stand."""
-        ranges = self._spec.plant.ranges
-        own = enumerate(zip(self._field, self._course.F, strict=True))
-        return {i: f - known for i, (f, known) in own if not names([f]).isdisjoint(ranges)}
 
     @property
     def has_rates(self) -> bool:
@@ -198,12 +186,9 @@ class Remainders:
 
     def rho(self, W: Sequence[Ball], U: Sequence[Ball], slow: Sequence[Slow]) -> list[Ball]:
         """sup |rho| where |e| <= W, |delta| <= U: through the unit matrix (n), and the columns of B (m)."""
-        acting = [arb(0)] * self._m
-        if self._jumps:
-            acting = [exact(self._spec.uncertainty.declared["h"])] * self._m
-        else:
-            for j, eta in zip(self._matched, slow, strict=False):
-                acting[j] = eta.size
+        acting = [exact(self._spec.uncertainty.declared["h"]) if self._jumps else arb(0)] * self._m
+        for j, eta in zip(self._matched, slow, strict=False):
+            acting[j] = eta.size
         bent = tops(self._off(own, W, U, acting) for own in self.windows)
         found = [x + y for x, y in zip(bent, self._defect, strict=True)]
         if not self._slow:

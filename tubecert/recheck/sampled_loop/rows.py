@@ -2,8 +2,7 @@
 
 A row r_i is the middle of the enclosed q_i = r_(i-1) AA: any numbers would do, for what they miss is added, |q_i - r_i|
 times the box of the state ("free rows"). From a lag of its own on a slow signal is taken for any one ("cut").
-Sums are exact: every term is rounded up to a multiple of a small unit. A product of a row with balls around 0 is a sum
-of magnitudes. Implements: theory of the sampled loop, section 3.
+A product of a row with balls around 0 is a sum of magnitudes. Implements: theory of the sampled loop, section 3.
 """
 
 from __future__ import annotations
@@ -13,9 +12,8 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate, pairwise
+from itertools import accumulate, chain, pairwise
 
 from flint import arb, arb_mat, ctx
 
@@ -37,7 +35,6 @@ from tubecert.recheck.sampled_loop.record import Stage
 from tubecert.recheck.sampled_loop.remainders import Size, Slow
 
 SETUP_BITS = 128  # of matrices: rows are carried in those of the context
-_UNIT_BITS = 160  # sums are whole multiples of 2^-160
 _ROUNDED = 1 + 1e-12  # what floats lose in a length
 _TELLS = 64  # lags
 _MOST_TERMS = 8_000_000  # kept: outputs x phases x lags
@@ -100,7 +97,7 @@ class Problem:
     @cached_property
     def boxes(self) -> arb_mat:
         """Those of xi, (width, phases)."""
-        return arb_mat(_turned([own.box for own in self.grounds]))
+        return arb_mat([list(own.box) for own in self.grounds]).transpose()
 
     @cached_property
     def arriving(self) -> Amplitudes:
@@ -118,7 +115,7 @@ class Problem:
         self, known: Sequence[Sequence[Ball]], sudden: Sequence[Size], slow: arb_mat
     ) -> Amplitudes:
         """Of signals that are known by phase, of those of a size, and of slow ones."""
-        rows, lengths, phases = _turned(known), [], len(self.grounds)
+        rows, lengths, phases = [list(row) for row in zip(*known, strict=True)], [], len(self.grounds)
         none = zeros(1, slow.ncols())
         for own in sudden:
             if own.length:
@@ -169,42 +166,40 @@ class Kernels:
         return sum((self._acting.of(rows * own) for own in self._nodes), start=rows * self._rest)
 
 
-class LateError(ArithmeticError):
-    """The time was up."""
-
-
 def carried(
     problem: Problem, outputs: arb_mat, cuts: Sequence[Sequence[int]], panels: int
-) -> list[list[int]]:
+) -> list[list[Ball]]:
     """b(k) of every output, its enclosed row at (xi_k, w_k), k = 0 .. last: without what acts within a sample.
 
-    In units. Raises `LateError`, or another `ArithmeticError` or `ValueError` for what is not finite.
+    Raises `ArithmeticError` if these are too many, or the time is up.
     """
     lags = min(problem.lags, problem.last)
     if outputs.nrows() * len(problem.grounds) * lags > _MOST_TERMS:
         raise ArithmeticError("there are too many rows, phases and lags")
-    with ctx.workprec(SETUP_BITS):
-        kernels = Kernels(problem, exact(problem.loop.sample), panels)
-        step, heard = parted(problem.loop.step, problem.loop.width)
-        arriving = problem.loop.arriving(heard)
-    found = _Pass(problem, outputs, cuts)
+    found = _Pass(problem, outputs, cuts, panels)
     for i in range(lags):
         if i % _TELLS == 0:
             if time_is_up():
-                raise LateError("the time was up")
+                raise ArithmeticError("the time was up")
             if (tell := told()) is not None:
                 tell(i, i / lags)
-        found.lag(i, kernels, step, arriving)
+        found.lag(i)
     return found.sums()
 
 
 class _Pass:
     """The rows at one lag, and what they have gathered: q is enclosed, its middles are the rows."""
 
-    def __init__(self, problem: Problem, outputs: arb_mat, cuts: Sequence[Sequence[int]]) -> None:
+    def __init__(
+        self, problem: Problem, outputs: arb_mat, cuts: Sequence[Sequence[int]], panels: int
+    ) -> None:
         loop, phases = problem.loop, len(problem.grounds)
         *_, r = loop.shape
-        self._problem, self._phases, self._count = problem, phases, outputs.nrows()
+        with ctx.workprec(SETUP_BITS):
+            self._kernels = Kernels(problem, exact(loop.sample), panels)
+            self._step, heard = parted(loop.step, loop.width)
+            self._arriving = loop.arriving(heard)
+        self._problem, self._count = problem, outputs.nrows()
         self._slow = loop.width - r  # where eta begins
         still = [arb(0)] * (self._slow - len(problem.error))
         begun = [*problem.error, *still, *(arb(0, own.first.abs_upper()) for own in problem.slow)]
@@ -220,15 +215,15 @@ class _Pass:
         self._q, heard = parted(outputs, loop.width)
         self._rows = self._q.mid()
         now = (self._q - self._rows) * self._boxes + problem.arriving.of(loop.shaken(heard))
-        self._now = [[units(x) for x in row[:phases]] for row in now.tolist()]
+        self._now = [[x.abs_upper() for x in row[:phases]] for row in now.tolist()]
         self._started = [self._starting()]
-        self._terms: list[list[list[int]]] = [[[] for _ in range(phases)] for _ in range(self._count)]
+        self._terms: list[list[list[Ball]]] = [[[] for _ in range(phases)] for _ in range(self._count)]
 
-    def lag(self, i: int, kernels: Kernels, step: arb_mat, arriving: arb_mat) -> None:
+    def lag(self, i: int) -> None:
         """From r_i to r_(i+1)."""
         extra = self._cut(i)
-        found = kernels.of(self._rows) + self._problem.arriving.of(self._rows * arriving)
-        self._q = self._rows * step
+        found = self._kernels.of(self._rows) + self._problem.arriving.of(self._rows * self._arriving)
+        self._q = self._rows * self._step
         for place in self._gone:
             self._q[place] = 0
         self._rows = self._q.mid()
@@ -237,7 +232,7 @@ class _Pass:
         for f, (own, terms) in enumerate(zip(found.tolist(), self._terms, strict=True)):
             shared = sum((own[c] for c in self._taken[f]), start=extra.get(f, arb(0)))
             for x, gathered in zip(own, terms, strict=False):
-                gathered.append(units(x + shared))
+                gathered.append((x + shared).abs_upper())
 
     def _cut(self, i: int) -> dict[int, Ball]:
         """What is taken out of the rows at this lag, at its magnitude."""
@@ -250,30 +245,25 @@ class _Pass:
             self._taken[f][c] += len(self._problem.slow)
         return extra
 
-    def _starting(self) -> list[int]:
+    def _starting(self) -> list[Ball]:
         """|q xi_0|."""
         n, radius, near = len(self._problem.error), self._problem.radius, [arb(0)] * self._count
         if radius > 0:
             near = [radius * _long(row[:n]) for row in self._q.tolist()]
         known = (self._q * self._begun).entries()
-        return [units(x.abs_upper() + y) for x, y in zip(known, near, strict=True)]
+        return [x.abs_upper() + y for x, y in zip(known, near, strict=True)]
 
-    def sums(self) -> list[list[int]]:
+    def sums(self) -> list[list[Ball]]:
         """b(k) of every output: what has been gathered, the tail |q_L| times the box, and what is added at once."""
         problem, lags, found = self._problem, len(self._started) - 1, []
-        tails = [[units(x) for x in row] for row in (sizes(self._q) * problem.boxes).tolist()]
         of, spans = [problem.phase(k) for k in range(problem.last + 1)], self._spans(lags)
-        for now, terms, tail, started in zip(
-            self._now, self._terms, tails, zip(*self._started, strict=True), strict=True
-        ):
-            own = [list(accumulate(each, initial=0)) for each in terms]
-            begun = [*started, *(tail[p] for p in of[1 : len(of) - lags])]
-            found.append(
-                [
-                    x + now[p] + sum(own[j][high] - own[j][low] for j, low, high in parts)
-                    for x, p, parts in zip(begun, of, spans, strict=True)
-                ]
-            )
+        tails, started = (sizes(self._q) * problem.boxes).tolist(), zip(*self._started, strict=True)
+        for now, terms, tail, begun in zip(self._now, self._terms, tails, started, strict=True):
+            own = [list(accumulate(each, initial=arb(0))) for each in terms]
+            late = (tail[p] for p in of[1 : len(of) - lags])
+            gathered = (sum((own[j][b] - own[j][a] for j, a, b in parts), start=arb(0)) for parts in spans)
+            every = zip(chain(begun, late), gathered, of, strict=True)
+            found.append([x + y + now[p] for x, y, p in every])
         return found
 
     def _spans(self, lags: int) -> list[list[tuple[int, int, int]]]:
@@ -286,21 +276,6 @@ class _Pass:
         return found
 
 
-def units(x: Ball) -> int:
-    """At least |x| in units; raises for what is not finite."""
-    top = x.abs_upper()
-    return 0 if top == 0 else math.ceil(math.ldexp(math.nextafter(float(top), math.inf), _UNIT_BITS))
-
-
-def limit(q: Fraction) -> int:
-    """At most q in units."""
-    return math.floor(q * (1 << _UNIT_BITS))
-
-
 def _long(row: Sequence[Ball]) -> Ball:
     """At least the Euclidean length, in floats."""
     return arb(math.hypot(*[float(x.abs_upper()) for x in row]) * _ROUNDED + 1e-150)
-
-
-def _turned(columns: Sequence[Sequence[Ball]]) -> list[list[Ball]]:
-    return [list(row) for row in zip(*columns, strict=True)]

@@ -74,11 +74,6 @@ class Course:
         return self.spec.trajectory.horizon if self.spec.afterwards == "nothing" else None
 
     @property
-    def intervals(self) -> int | None:
-        """Sample intervals up to there."""
-        return None if self.horizon is None else ceil(self.horizon / self.spec.hardware.sample_time)
-
-    @property
     def smooth(self) -> bool:
         """Whether u* has a rate."""
         if self.family is not None:
