@@ -130,10 +130,10 @@ class Case:
         machine, own, n = self._spec.hardware, self.proven, len(self._spec.plant.states)
         H = arb_mat(n, len(self._slow), [eta.column[i] for i in range(n) for eta in self._slow])
         loop = Loop(own.A, own.B, H, own.F, own.G, own.M, own.N, machine.sample_time, machine.delay)
-        noise, grounds = Size.of(machine.noise, n), []
-        for begin, stage, acting in phases_of(own.stages, loop.shape[3]):
+        noise, waiting, grounds = Size.of(machine.noise, n), loop.shape[3], []
+        for begin, stage, acting in phases_of(own.stages, waiting):
             W, Z, U = (list(map(exact, sizes_)) for sizes_ in (stage.half_widths, stage.memory, acting))
-            box = [*W, *Z, *U * loop.shape[3], *(eta.size for eta in self._slow)]
+            box = [*W, *Z, *U * waiting, *(eta.size for eta in self._slow)]
             rho = self.remainders.rho(W, U, self._slow)
             grounds.append(Ground(begin, stage, rho, self._rounding(loop, noise, W, Z), box))
         last, horizon = own.stages[-1].start + loop.whole + 1 + own.recipe.lags, self.course.horizon
@@ -145,8 +145,8 @@ class Case:
 
     def _rounding(self, loop: Loop, noise: Size, W: Sequence[Ball], Z: Sequence[Ball]) -> list[Ball]:
         """What dy (n), u (m) and zeta (z) are off by, (D.8)."""
-        own, u, k = self.remainders, _ROUNDING[self._spec.hardware.arithmetic], sum(loop.shape[:3:2]) + 3
-        gamma, lost = exact(k * u / (1 - k * u)), exact(_FLUSHED)
+        own, u, (n, _, z, _, _) = self.remainders, _ROUNDING[self._spec.hardware.arithmetic], loop.shape
+        c, lost = (z + n + 3) * u, exact(_FLUSHED)
         measured = [
             (exact(PLAN) * x + exact(2 * u) * (2 * x + w + s)) * exact(_SECOND) + lost
             for x, w, s in zip(own.states_above, W, noise.each, strict=True)
@@ -154,6 +154,7 @@ class Case:
         seen = [w + s + y for w, s, y in zip(W, noise.each, measured, strict=True)]
         told = sizes(joined([[loop.M, loop.N], [loop.F, loop.G]])) * column([*Z, *seen])
         planned = [*map(arb.__add__, own.inputs_above, own.held), *[arb(0)] * len(Z)]
+        gamma = exact(c / (1 - c))
         return [*measured, *(gamma * (x + y) + lost for x, y in zip(planned, told.entries(), strict=True))]
 
     def _start(self) -> tuple[list[Ball], Ball]:
