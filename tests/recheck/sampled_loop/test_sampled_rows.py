@@ -21,7 +21,7 @@ from tubecert.recheck.sampled_loop.exponential import flow
 from tubecert.recheck.sampled_loop.loop import Loop
 from tubecert.recheck.sampled_loop.obstacles import _apart
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
-from tubecert.recheck.sampled_loop.remainders import Size, Slow
+from tubecert.recheck.sampled_loop.remainders import Remainders, Size, Slow
 from tubecert.recheck.sampled_loop.rows import Ground, Problem
 from tubecert.recheck.sampled_loop.windows import Course, course_of
 from tubecert.recheck.specification import read_sampled_specification
@@ -220,12 +220,16 @@ def test_a_box_keeps_away_from_a_polygon_by_an_axis_or_by_a_line():
         assert _apart(polygon, box) is apart, (x, y)
 
 
+def read_spec(text):
+    return read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
+
+
 def test_a_plan_of_a_family_moves_as_the_plant_does_and_by_its_defect():
     text = SCALAR.replace(
         "{kind: equilibrium, at: [0], input: [0]}",
         "{kind: any, x: {x: [-1, 1]}, u: {u: [-2, 2]}, defect: 0.25, input_rate: 3}",
     ).replace("{at: [0.3]}", "{within: 0.1}")
-    spec = read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
+    spec = read_spec(text)
     course = course_of(spec, Plan("any", None, None, None, None, None))
     (window,) = course.windows(1)
     assert window.speed[0].contains(arb(0, "2.75"))
@@ -237,10 +241,37 @@ def test_a_plan_of_a_family_moves_as_the_plant_does_and_by_its_defect():
 def test_inputs_that_jump_between_knots():
     """Up at .95, up again at 1.02, across the end; and jumps where commands begin to act."""
     text = SWING.replace("rate: 10, delay: one sample, hold: left", "rate: 5")
-    spec = read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
+    spec = read_spec(text)
     t, u = ("0", "0.02", "0.3", "0.67", "0.95", "1"), (0, 1, 0, -1, 0, 0)
     for times, rows, most in ((t, u, 2), (("0", "0.2", "0.4", "0.6", "0.8", "1"), (0, 1, 0, 1, 0, 0), 0)):
         knots = Knots(tuple(map(Fraction, times)), tuple((Fraction(x),) for x in rows))
         assert Course(spec, None, knots)._jumps(0, Fraction(1, 10), knots) == most
     left = replace(spec, hardware=replace(spec.hardware, hold="left"))
     assert Course(left, None, knots)._jumps(0, Fraction(1, 5), knots) == 2
+
+
+def test_a_wind_through_a_row_is_a_length_or_its_components():
+    row = [arb(3, 1), arb(-4)]
+    for bound, most in ((Fraction(2), 2 * 32**0.5), ((Fraction(1), Fraction(2)), 12)):
+        assert abs(float(Size.of(bound, 2).through(row).upper()) - most) < 1e-6
+
+
+def test_what_is_not_linear_and_what_shakes_add_up():
+    """f = x/2 + x^2/10 where |e| <= .1: .2 x (.2 + .4 + .6 + .8 + 1)/5 a step; E = 1 + x/10 with |w| <= .2."""
+    text = SCALAR.replace("0.5*x", "0.5*x + 0.1*x**2").replace("E: [[1]]", 'E: [["1 + 0.1*x"]]')
+    course = course_of(read_spec(text), Plan("equilibrium", None, None, None, None, None))
+    nominal = arb_mat([[0.5]]), arb_mat([[1]]), arb_mat([[1]])
+    found = Remainders(course, nominal, 1, slow=True).rho([arb(0.1)], [arb(0.5)], [])
+    assert 0.0032 <= float(found[0].upper()) < 0.00321
+
+
+def test_a_plan_that_rests_misses_what_the_plant_does_where_it_ends():
+    """x* = t and u* = 2 t: |1 - 2.5 t| is at most 1.5 while it moves, and then |F| is 2.5."""
+    text = SCALAR.replace(
+        "{kind: equilibrium, at: [0], input: [0]}",
+        '{kind: expressions, x: ["t"], u: ["2*t"], horizon: 1, afterwards: rest}',
+    )
+    course = course_of(read_spec(text), Plan("expressions", None, None, None, None, None))
+    last = course.windows(4)[-1]
+    assert [float(x) for x in (*last.x, *last.u, *last.speed, *last.steepness)] == [1, 2, 0, 0]
+    assert abs(float(course.defect()[0].upper()) - 2.5) < 1e-9
