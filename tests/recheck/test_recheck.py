@@ -28,7 +28,11 @@ from tubecert.model import ControlAffineModel
 from tubecert.recheck.constants import OVER_TUBE, bounded
 from tubecert.recheck.run import recheck
 
-CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*state*.yaml"))
+CONFIGS = [
+    path
+    for path in sorted((Path(__file__).parents[2] / "configs").glob("*state*.yaml"))
+    if not path.stem.startswith("hardware_")
+]
 THREE = next(path for path in CONFIGS if path.stem == "three_state")
 TWO = next(path for path in CONFIGS if path.stem == "two_state")
 
