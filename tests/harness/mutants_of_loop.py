@@ -35,7 +35,7 @@ SIDES = {
     "recheck": (
         "tubecert.recheck.sampled_loop",
         ("conditions", "rows", "loop", "remainders", "windows", "claims", "exponential", "obstacles"),
-        ("tests/recheck/sampled_loop/test_sampled_rows.py",),
+        ("tests/recheck/sampled_loop",),
     ),
 }
 FEW_SECONDS = 150
@@ -171,7 +171,9 @@ def killer(side, package, tests, good, bad):
     for name in [
         own
         for own in sys.modules
-        if own.startswith((package, "tubecert.loop_design", "tubecert.recheck.run"))
+        if own.startswith(
+            (package, "tubecert.loop_design", "tubecert.recheck.run", "sampled_files", "test_sampled")
+        )
     ]:
         del sys.modules[name]
     for own in good:
