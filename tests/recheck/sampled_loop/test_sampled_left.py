@@ -6,9 +6,11 @@ import pytest
 from flint import arb, arb_mat
 from sampled_files import CART, SCALAR, changed, made, why_not
 
-from tubecert.recheck.document import Node
+from tubecert.recheck.document import Node, read
 from tubecert.recheck.plans import Plan
+from tubecert.recheck.sampled_loop.claims import Case
 from tubecert.recheck.sampled_loop.loop import Loop
+from tubecert.recheck.sampled_loop.record import read_certificate
 from tubecert.recheck.sampled_loop.remainders import Remainders
 from tubecert.recheck.sampled_loop.windows import course_of
 from tubecert.recheck.specification import read_sampled_specification
@@ -33,8 +35,8 @@ def scalar(f="0", B="1", more=""):
 def left(*, A=0, E=(), slow=False, **sections) -> Remainders:
     """Of x' = f + B u with some sections in place of those at home."""
     text = "tubecert: 1\nname: a\n" + "\n".join(f"{k}: {v}" for k, v in {**HOME, **sections}.items())
-    read = read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
-    course = course_of(read, Plan(read.trajectory.kind, None, None, None, None, None))
+    given = read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
+    course = course_of(given, Plan(given.trajectory.kind, None, None, None, None, None))
     nominal = arb_mat([[A]]), arb_mat([[1]]), arb_mat(1, len(E), list(E))
     return Remainders(course, nominal, 256, slow=slow)
 
@@ -115,3 +117,13 @@ def test_a_range_holds_on_both_sides(ends):
 def test_h_is_defined_on_all_of_the_safe_set():
     h = ["0.2*sin(t) + 0.0000001*log(p + 5)"]
     assert why_not(changed(made(CART), "spec", "effective", "uncertainty", "h", to=h))
+
+
+@pytest.mark.slow
+def test_h_is_as_large_as_on_the_widest_stage():
+    document = made(SCALAR.replace("limits:", "uncertainty: {h: ['0.1*x']}\nlimits:"), base=SCALAR)
+    widths = [float(stage["half_widths"]["x"]) for stage in document["result"]["tube"]]
+    result = read_certificate(read(json.dumps(document), "certificate")).result
+    (own,) = Case(result, result.proven, 2000)._slow
+    assert max(widths) > 2 * min(widths)
+    assert 0.1 * max(widths) <= float(own.size.abs_upper()) <= 0.101 * max(widths)
