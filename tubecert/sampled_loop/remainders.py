@@ -120,10 +120,6 @@ class Remainders:
 
     # -- on the tube -------------------------------------------------------------------------------------------------
 
-    def variation(self) -> Array:
-        """sup |F_z - (A, B)| along the plan itself, (n, n + m), z = (x, u)."""
-        return np.asarray(self._off(self.cells.x, self.cells.u).max(axis=0))
-
     def middle(self) -> tuple[Array, Array, Array]:
         """Floats in the middle of F_x, F_u and E along the plan: (n, n), (n, m), (n, k)."""
         n, m = self.loop.states, self.loop.inputs

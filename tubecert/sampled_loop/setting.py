@@ -271,7 +271,6 @@ class Loop:
         if spec.within is not None:
             return Start(Known.exact(np.zeros((n, 1))), nothing, fraction_bounds(spec.within)[1])
         planned = Tape(self.plan.start, ()).run([], ())
-        middle, box = Interval.of(0), nothing
         ends = spec.start_box or tuple((x, x) for x in spec.x0)
         bounds = np.array([(*fraction_bounds((a + b) / 2), fraction_bounds((b - a) / 2)[1]) for a, b in ends])
         middle, box = Interval(bounds[:, 0], bounds[:, 1]), bounds[:, 2]

@@ -426,7 +426,7 @@ def _domain(loop: Loop, inequalities: Inequalities, boxes: Boxes) -> list[Lack]:
     for i, (name, (low, high)) in enumerate(zip(loop.model.states, loop.spec.safe_set, strict=True)):
         least, most = number_below(cells.x.lo[:, i].min() - W[i]), number_above(cells.x.hi[:, i].max() + W[i])
         if not (least >= fraction_bounds(low)[1] and most <= fraction_bounds(high)[0]):
-            over = max(least - float(high), float(low) - least, most - float(high))
+            over = max(float(low) - least, most - float(high))
             lacks.append(Lack(kind="safe_set", where=name, needed=float(over) if np.isfinite(over) else None))
     return lacks
 
@@ -460,7 +460,7 @@ def _inputs(loop: Loop, remainders: Remainders, boxes: Boxes) -> tuple[tuple[Inp
         given = limits.get(name)
         uses.append(InputUse(input=name, range=ends, limits=given))
         if given is not None and not (given[0] <= ends[0] and ends[1] <= given[1]):
-            room = min(float(high[j] * 0 + given[1]) - float(high[j]), float(low[j]) - float(given[0]))
+            room = min(float(given[1]) - float(high[j]), float(low[j]) - float(given[0]))
             lacks.append(Lack(kind="inputs", where=name, needed=float(U[j]), allowed=room))
     return tuple(uses), lacks
 
