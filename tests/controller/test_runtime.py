@@ -114,6 +114,13 @@ def test_where_the_input_jumps_it_is_taken_from_its_interval(afterwards, steps, 
     assert own.state["bad"] == 0
 
 
+def test_a_plan_that_goes_on_is_known_after_months():
+    plan = data_of(handmade.certificate(handmade.WAVE % ", afterwards: repeat", afterwards="repeat")).plan
+    x, u = plan.at([k := 2**30 - 1])  # 249 days
+    assert x[0] == pytest.approx([np.sin(k * 0.02), np.cos(k * 0.02)], abs=1e-7)
+    assert u[0] == pytest.approx([u_star(k * 0.02 + 0.015)], abs=1e-7)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("arithmetic", ["double", "single"])
 def test_a_bad_sample_holds_and_is_told_while_it_lasts(arithmetic):

@@ -53,7 +53,7 @@ def test_functions_do_not_stop_at_an_underflow():
     assert iv.sin(Interval.exact(1e-310)).lo < 1e-310
 
 
-@pytest.mark.parametrize("large", [1e7, 1e17, 1e300])
+@pytest.mark.parametrize("large", [2e12, 1e17, 1e300])
 def test_of_large_angles_nothing_is_known(large):
     opened = iv.tan(Interval.exact(large)).sanitised()
     assert (opened.lo, opened.hi) == (-math.inf, math.inf)

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 # numpy's and libm's elementary functions are documented to 4 ulp; 16 units of 2**-53 relative are 8 to 16 ulp.
 _LIBRARY_ERROR: Final = 16 * 2.0**-53
 _TINY: Final = 1e-300  # covers gradual underflow of library functions
-_LARGEST_ANGLE: Final = 1e6  # beyond it the quadrant test below would need more than double precision
+_LARGEST_ANGLE: Final = 1e12  # beyond it the quadrant test below would need more than double precision
 
 
 _UNKNOWN: Final = np.array(np.nan)
@@ -287,8 +287,9 @@ def log1p(a: Interval) -> Interval:
 def _touches(a: Interval, phase: float) -> NDArray[np.bool_]:
     """Whether phase + 2 k pi may lie in `a` for some integer k; says yes in doubt."""
     period = 2 * np.pi
-    slack = 1e-9  # the float error of the quotients is below 1e-9 for |x| <= 1e6
-    return np.ceil((a.lo - phase) / period - slack) <= np.floor((a.hi - phase) / period + slack)
+    # the float error of a quotient, and of its slack, is below 1e-16 (|x| + 10) for |x| <= 2e12
+    left, right = (np.maximum(1e-9, 1e-15 * np.fmin(np.abs(end), 4e12)) for end in (a.lo, a.hi))
+    return np.ceil((a.lo - phase) / period - left) <= np.floor((a.hi - phase) / period + right)
 
 
 def _wave(a: Interval, function: np.ufunc, peak: float, trough: float) -> Interval:
