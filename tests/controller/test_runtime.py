@@ -214,6 +214,23 @@ def test_fast_math_is_refused(tmp_path, flag):
         build(shipped(tmp_path / "c"), [flag, "-c", "controller.c"])
 
 
+FROM_CPP = """
+#include "controller.h"
+int main() { State s; real y[NX] = {}, u[NU]; controller_start(&s); return controller_step(&s, y, u) & STATUS_END; }
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no compiler of C++ here")
+def test_a_program_in_cpp_calls_it(tmp_path):
+    folder = shipped(tmp_path / "c")
+    (folder / "main.cpp").write_text(FROM_CPP)
+    build(folder, ["-c", "controller.c"])
+    call = ["g++", "-Wall", "-Wextra", "-Werror", "main.cpp", "controller.o", "-o", "main"]
+    subprocess.run(call, cwd=folder, check=True)
+    assert subprocess.run([folder / "main"], check=False).returncode == 0
+
+
 ATTACK = """
 #include "controller.h"
 #include <math.h>

@@ -25,9 +25,15 @@ typedef struct {
   uint32_t status;        /* of the last sample: STATUS_... or 0 */
 } State;
 
+#ifdef __cplusplus
+extern "C" {
+#endif
 void controller_start(State *s); /* before the first sample */
 /* y: the states as measured; u: the inputs; returns s->status. */
 uint32_t controller_step(State *s, const real y[NX], PLAN_GIVEN real u[NU]);
 /* The same for n loops: s[n], y[n][NX], u[n][NU] (and xs[n][NX], us[n][NU]), one after the other in memory. */
 void controller_step_many(State *s, size_t n, const real *y, PLAN_GIVEN real *u);
+#ifdef __cplusplus
+}
+#endif
 #endif
