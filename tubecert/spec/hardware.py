@@ -17,6 +17,7 @@ from tubecert.spec.document import ListNode, MappingNode, Scalar
 from tubecert.spec.instead import same_as
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
+from tubecert.spec.settings import RANGES
 from tubecert.spec.types import (
     Arithmetic,
     Controller,
@@ -42,20 +43,23 @@ _WITHOUT_METRIC: Final = "the sampled loop is proven without a metric: leave it 
 _WIDTHS: Final = (
     "the tube of a sampled loop is found, half_widths are wishes: leave it out, or leave out hardware"
 )
+_EXPECTED: Final = "of a sampled loop verdict, half_widths and inputs can be expected: leave it out"
 _ONE_NUMBER: Final = "write one number, the bound of |w|; a list of them goes with hardware: {rate: 500}"
 _OF_A_COMPUTER: Final = "name the computer that it is about, hardware: {rate: 500}, or leave it out"
 IN_CONTINUOUS_TIME: Final = ("metric", "adaptation", "conditions")
 """Sections of a file that asks about a loop in continuous time."""
 
+_OF_GAINS: Final = ("metric", *(key for key in RANGES if key != "inputs"))  # what else a file may expect
 _TUBE_IN_TIME: Final = ("epsilon", "rho_a", "coordinates", "gap")
 
 
 def check_machine(entries: Mapping[str, Field]) -> None:
     """Reports what does not go with `hardware`, and what does not go without."""
-    plan, tube, wind = (entries.get(key) for key in ("trajectory", "tube", "disturbance"))
+    plan, tube, wind, expect = map(entries.get, ("trajectory", "tube", "disturbance", "expect"))
     if "hardware" in entries:
         told = [(entries.get(key), _WITHOUT_METRIC) for key in IN_CONTINUOUS_TIME]
         told += [(tube and tube.get(key), _WIDTHS) for key in _TUBE_IN_TIME]
+        told += [(expect and expect.get(key), _EXPECTED) for key in _OF_GAINS]
         beside = "beside"
     else:
         told = [(entries.get("controller"), _OF_A_COMPUTER)]
