@@ -86,6 +86,9 @@ def test_all_that_is_about_a_metric_is_refused_at_once():
     for name in given:
         assert f"--{name}: error TC112: --{name} is about a certificate with a metric" in done.stderr
         assert f"leave --{name} out, or leave hardware out" in done.stderr
+    for name, value in (("jobs", "2"), ("scheduler", "tcp://a:1")):
+        done = run("certify", "cart.yaml", f"--{name}={value}")
+        assert f"--{name}: error TC112: --{name} is about a long search; the sampled loop" in done.stderr
     assert not Path("cart.certificate.json").exists()
 
 

@@ -105,9 +105,9 @@ def test_certify_answers_for_hardware_and_refuses_what_is_about_metrics(monkeypa
     assert tc.certify(question).certified
     assert asked == {"name": "cart", "settings": {"hardware.rate": "400"}, "command": "tubecert.certify"}
     with pytest.raises(tc.SpecError) as refused:
-        tc.certify(question, rho_a=0.1, conditions="B", deadline=3)
+        tc.certify(question, rho_a=0.1, conditions="B", deadline=3, jobs=2)
     about = {str(item.location).partition(":")[0] for item in refused.value.findings}
-    assert about == {"rho_a", "conditions", "deadline"}
+    assert about == {"rho_a", "conditions", "deadline", "jobs"}
     with pytest.raises(tc.SpecError, match="without a metric"):
         tc.synthesise(question, rate=1)
 

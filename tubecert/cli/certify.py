@@ -100,7 +100,8 @@ def run(given: Given, output: Output) -> ExitCode:
 def _sampled(given: Given, system: Spec, files: tuple[str, Sequence[str]], output: Output) -> ExitCode:
     """The same of a sampled loop; `files` are that of the certificate and those of pages."""
     words = {"metric": given.metric, "conditions": given.conditions, "scheduler": given.scheduler}
-    require_nothing_of_a_metric({**given.numbers, **words, "deadline": None}, flag)
+    words |= {"deadline": None, "jobs": None if given.jobs == "1" else given.jobs}
+    require_nothing_of_a_metric({**given.numbers, **words}, flag)
     from tubecert.library import sampled
     from tubecert.report import text
     from tubecert.report.sampled_loop import page_of

@@ -30,8 +30,9 @@ _SETS: Final = {
 }  # options by the keys they set
 _OF_A_METRIC: Final = (
     "rho_a", "epsilon", "metric", "conditions", "bandwidth", "adaptation_rate", "gap", "budget", "deadline",
-    "scheduler", "controllers", "gains", "replay", "members", "replan", "plan",
+    "jobs", "scheduler", "controllers", "gains", "replay", "members", "replan", "plan",
 )  # fmt: skip
+_OF_SEARCHES: Final = ("deadline", "jobs", "scheduler")
 Named: TypeAlias = Callable[[str], str]
 _BUDGET: Final = 2_000_000  # of a verification
 _GAP: Final = Fraction(1, 1000)
@@ -96,11 +97,12 @@ def require_nothing_of_a_metric(given: Mapping[str, object], named: Named) -> No
     findings = [
         Finding(
             code="TC112",
-            message=f"{named(name)} is about a certificate with a metric; the sampled loop is proven without",
+            message=f"{named(name)} is about {what}; the sampled loop is proven without",
             location=NamedPlace(file=named(name), line=1, column=1),
             help=f"leave {named(name)} out, or leave hardware out of the specification",
         )
         for name in _OF_A_METRIC
+        for what in ("a long search" if name in _OF_SEARCHES else "a certificate with a metric",)
         if given.get(name) is not None
     ]
     if findings:

@@ -80,8 +80,8 @@ def certify(
     _check_words(conditions, numbers)
     whole = spec_of(spec)
     if whole.hardware is not None:
-        given = {**texts, "metric": metric, "conditions": conditions, "scheduler": scheduler}
-        require_nothing_of_a_metric(given, str)
+        words = {"metric": metric, "conditions": conditions, "scheduler": scheduler}
+        require_nothing_of_a_metric({**texts, **words, "jobs": None if jobs == 1 else jobs}, str)
         from tubecert.library import sampled
 
         return sampled.certified(whole, progress=timed(progress), command="tubecert.certify")
