@@ -16,6 +16,8 @@ from tubecert.records import exact_json
 Number = float | int | str | Fraction
 UNKNOWN: Final = "-"
 _LONG: Final = 16
+_DEGREE: Final = Fraction("3.14159265358979323846264338327950288") / 180
+_SAME: Final = Fraction(1, 10**24)  # of a number: a certificate has 30 digits
 
 
 def short(value: Number | None, digits: int = 4) -> str:
@@ -50,9 +52,19 @@ def exact(value: Number | None) -> str:
 
 
 def end(value: Number | None) -> str:
-    """An end of a range: exact, but for multiples of pi, of which the certificate holds 30 digits."""
+    """An end of a range: exact, but for multiples of pi, of which the certificate holds 30 digits: in degrees."""
     text = exact(value)
-    return text if len(text) <= _LONG else short(value, _LONG - 4)
+    if len(text) <= _LONG:
+        return text
+    degrees = short(Fraction(text) / _DEGREE, 8)
+    same = abs(Fraction(text) - Fraction(degrees) * _DEGREE) <= _SAME * abs(Fraction(text))
+    return f"{degrees} deg" if same else short(value, _LONG - 4)
+
+
+def in_unit(text: str, unit: str) -> str:
+    """What `end` says with its unit, where degrees stand in place of radians."""
+    degrees = text.endswith(("deg", "deg]")) and unit.startswith("rad")
+    return text + unit.removeprefix("rad") if degrees else f"{text} {unit}".rstrip()
 
 
 def percent(margin: float | None) -> str:

@@ -2,7 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ET
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from fractions import Fraction
 
 import pages
@@ -16,11 +16,12 @@ from tubecert.report import pages as explained
 from tubecert.report.sampled_loop import page_of
 from tubecert.report.terminal import Terminal
 from tubecert.report.text import screen
-from tubecert.sampled_loop.record import Claim, Cleared, InputUse, Lack, Notes, Shares
+from tubecert.sampled_loop.record import Claim, Cleared, InputUse, Lack, Notes, Shares, Stage
 from tubecert.verdict import Verdict
-from tubecert.words.sampled_loop import filling, percents, remedy, why
+from tubecert.words.sampled_loop import NOTHING, filling, percents, remedy, why
 
 TEXTS = {"cart": sampled.SPEC, "family": sampled.FAMILY, "drone": sampled.DRONE}
+OF_CART = sampled.certificate().result.spec.effective
 CLOSING = [("certificate", "cart.certificate.json"), ("next", "a"), ("", "b"), ("", "c")]
 LACKS = {
     "inputs": Lack(kind="inputs", where="F", needed=1.58, allowed=1.0),
@@ -58,7 +59,7 @@ def test_what_is_lacking_is_told_with_what_helps_and_never_as_proven(lack):
     text = shown(sampled.undecided(lack))
     assert text.startswith("undecided cart: ")
     assert len(text.splitlines()) <= 18
-    assert why(lack, {"F": "N", "p": "m", "v": "m/s"}) in " ".join(text.split())
+    assert why(lack, OF_CART) in " ".join(text.split())
     assert "None" not in text + shown(sampled.undecided(lack), verbose=True)
     assert not [
         words for words in ("- of -", "\n  tube  ", "tube keeps away", "of the room") if words in text
@@ -102,7 +103,7 @@ def test_explain_knows_every_label(name):
 @given(st.builds(Shares, **dict.fromkeys(asdict(sampled.WIDE), st.floats(0, 1e6))))
 def test_shares_add_up(shares):
     found = percents(shares)
-    assert sum(found.values()) == (100 if sum(asdict(shares).values()) > 0 else 0)
+    assert sum(found.values()) == (100 if sum(asdict(shares).values()) >= NOTHING else 0)
     assert all(part > 0 for part in found.values())
     assert filling(shares).count("%") == len(found)
 
@@ -115,9 +116,45 @@ def test_how_much_of_the_room_is_used(one, other):
 
 
 def test_the_remedy_names_what_asks_most():
-    assert "start" in remedy(LACKS["inputs"], Notes(deviations={"F": sampled.PUSH}))
-    assert "wind" in remedy(LACKS["wish"], Notes(long_run={"p": sampled.NARROW}))
-    assert "noise, wind, h or delay" in remedy(LACKS["inputs"], Notes())
+    assert "start" in remedy(LACKS["inputs"], OF_CART, Notes(deviations={"F": sampled.PUSH}))
+    assert "wind" in remedy(LACKS["wish"], OF_CART, Notes(long_run={"p": sampled.NARROW}))
+    assert "noise, wind, h or delay" in remedy(LACKS["inputs"], OF_CART, Notes())
+    assert "mode of p" in remedy(LACKS["mode"], OF_CART, Notes())
+    assert "mode" not in remedy(LACKS["nothing found"], OF_CART, Notes())
+
+
+def test_without_a_controller_one_is_advised():
+    own = sampled.SPEC + "controller: none\n"
+    grows, widens = "a mode of p does not die away: it grows by 0.3", "no tube closes: that of v widens"
+    for name, told in (("mode", grows), ("no tube", widens)):
+        text = shown(sampled.certificate(own, verdict=Verdict.UNDECIDED, lacks=(LACKS[name],)))
+        assert f"without a controller {told}" in " ".join(text.split())
+        assert "help        controller: auto" in text
+    text = shown(sampled.certificate(own, verdict=Verdict.UNDECIDED, lacks=(LACKS["safe set"],)))
+    assert "a larger safe_set" in text
+
+
+def test_where_nothing_acts_it_is_said_in_one_way():
+    least = Fraction("1e-30")
+    stage = Stage(start=0, half_widths={"p": Fraction("0.1"), "v": least}, deviations={"F": least}, memory=())
+    use = InputUse(input="F", range=(-least, Fraction("0.5") + least))
+    notes = {"start": {"v": replace(sampled.NARROW, **dict.fromkeys(asdict(sampled.NARROW), 1e-30))}}
+    own = sampled.certificate(tube=(stage,), inputs=(use,))
+    text = shown(replace(own, notes=replace(own.notes, long_run={}, deviations={}, **notes)), verbose=True)
+    assert "e-30" not in text
+    assert "v (m/s)     < 1e-12\n" in text
+    assert "F           0 to 0.5, within 1e-12 N\n" in text
+
+
+def test_degrees_are_shown_as_degrees():
+    own = sampled.SPEC.replace("p: m, v: m/s", "p: rad, v: rad/s").replace(
+        "{at: [0.1, 0]}", "{box: {p: [-5 deg, 5 deg]}}"
+    )
+    own = own.replace("{p: 0.001, v: 0.002}", "{p: 0.1 deg, v: 2 deg}").replace("{p: 0.15}", "{p: 10 deg}")
+    text = shown(sampled.certificate(own))
+    assert "noise p 0.1 deg, v 2 deg/s" in text
+    assert "anywhere with p in [-5 deg, 5 deg], all else 0" in text
+    assert "p (rad)     0.1321    0.034       0.174533" in text
 
 
 def figures_of(page):

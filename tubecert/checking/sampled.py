@@ -12,11 +12,15 @@ from tubecert.words.sampled_loop import remedy, why
 
 def outcome(certificate: Certificate) -> Outcome:
     """The verdict, half-widths, what the inputs use of their room, and why it is not certified."""
-    result, notes = certificate.result, certificate.notes
-    units = result.spec.effective.system.units
-    told = ((lack.kind, why(lack, units), remedy(lack, notes)) for lack in result.lacks)
+    result, notes, effective = certificate.result, certificate.notes, certificate.result.spec.effective
     lacks = [
-        Claim(name=kind, verdict=result.verdict, message=words, relax=help) for kind, words, help in told
+        Claim(
+            name=lack.kind,
+            verdict=result.verdict,
+            message=why(lack, effective),
+            relax=remedy(lack, effective, notes),
+        )
+        for lack in result.lacks
     ]
     claims = tuple(lacks) or (Claim(name="sampled loop", verdict=result.verdict),)
     return Outcome(verdict=result.verdict, metric=None, numbers=tuple(_numbers(result)), claims=claims)

@@ -66,11 +66,15 @@ class SampledCertification(Stated):
         from tubecert.report.page import Reason
         from tubecert.words.sampled_loop import remedy, why
 
-        lacks, notes = self.result.lacks, self.certificate.notes
-        told = ((lack.kind, why(lack, self.units), remedy(lack, notes)) for lack in lacks)
+        effective, notes = self.result.spec.effective, self.certificate.notes
         return tuple(
-            Reason(verdict=self.verdict, claim=kind, message=message, relax=help)
-            for kind, message, help in told
+            Reason(
+                verdict=self.verdict,
+                claim=lack.kind,
+                message=why(lack, effective),
+                relax=remedy(lack, effective, notes),
+            )
+            for lack in self.result.lacks
         )
 
     @property

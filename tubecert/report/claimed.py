@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tubecert.certificate.effective import SystemView, Tree
-from tubecert.digits import end, short
+from tubecert.digits import end, in_unit, short
 from tubecert.records import to_json
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def started(told: Tree, system: SystemView, whose: str) -> str:
         name: (at, at) for name, at in zip(system.states, told.get("at", ()), strict=False)
     }
     places = {name: _place(*ends) for name, ends in sides.items() if set(ends) != {"0"}}
-    said = [f"{name} {where} {system.units.get(name, '')}".rstrip() for name, where in places.items()]
+    said = [f"{name} {in_unit(where, system.units.get(name, ''))}" for name, where in places.items()]
     if len(said) < len(sides):
         said.append("all else 0" if said else "0")
     wide = any(where.startswith("in") for where in places.values())

@@ -9,14 +9,25 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import Final
 
-from tubecert.digits import down, exact, up
+from tubecert.digits import down, near, short, up
 from tubecert.report.claimed import NOT_RECHECKED, started
 from tubecert.report.figures_sampled import figures, period
 from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Section, Table, Tile
 from tubecert.report.page_simulation import Simulated, simulated_blocks
-from tubecert.sampled_loop.record import Certificate, Notes, Result
+from tubecert.sampled_loop.record import Certificate, InputUse, Notes, Result
 from tubecert.verdict import Verdict
-from tubecert.words.sampled_loop import assumed, extent, family, filling, loop, plan, promise, remedy
+from tubecert.words.sampled_loop import (
+    NOTHING,
+    assumed,
+    extent,
+    family,
+    filling,
+    loop,
+    plan,
+    promise,
+    remedy,
+    size,
+)
 
 _MOST, _ROWS = 6, 4  # states of the first screen; where there are more than four, they stand side by side
 _TILES: Final = 4
@@ -45,7 +56,7 @@ def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Pag
         summary=promise(result),
         meaning=f"{_meaning(result)} {NOT_RECHECKED}",
         tiles=tuple(
-            Tile(symbol=name, value=f"±{up(width)}", unit=system.units.get(name, ""), words="half-width")
+            Tile(symbol=name, value=f"±{size(width)}", unit=system.units.get(name, ""), words="half-width")
             for name, width in [*result.half_widths.items()][:_TILES]
         ),
         sections=tuple(section for section in found if section.blocks),
@@ -99,10 +110,10 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     columns[0] += [f"{name} ({system.units[name]})" if system.units.get(name) else name for name in named]
     for stages in filter(None, (result.tube, result.tube[1:][-1:])):  # what is never left, and the long run
         bounds = [{**stage.half_widths, **stage.deviations} for stage in stages]
-        widths = (up(max(own[name] for own in bounds)) for name in named)
+        widths = (size(max(own[name] for own in bounds)) for name in named)
         columns.append([f"from {up(stages[0].start * period(result))} s", *widths])
     if wishes:
-        columns.append(["wish", *(exact(wishes[name]) if name in wishes else "" for name in named)])
+        columns.append(["wish", *(near(wishes[name]) if name in wishes else "" for name in named)])
     if filled := notes.filled if notes else {}:
         columns.append(["filled by", *(filling(filled[name]) if name in filled else "" for name in named)])
     aside = len(names) > _ROWS and not notes
@@ -120,11 +131,20 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
 def _inputs(result: Result) -> Iterator[tuple[str, str]]:
     units = result.spec.effective.system.units
     for use in result.inputs:
-        told = f"{down(use.range[0])} to {up(use.range[1])} {units.get(use.input, '')}".rstrip()
+        told = f"{_range(use)} {units.get(use.input, '')}".rstrip()
         if use.limits is not None and use.share is not None:
-            limits, used = " to ".join(map(exact, use.limits)), up(100 * use.share, 3)
+            limits, used = " to ".join(map(near, use.limits)), up(100 * use.share, 3)
             told += f" of {limits}: {used} % of the room"
         yield use.input, told
+
+
+def _range(use: InputUse) -> str:
+    """Its ends, rounded outward; of an input to which nothing but rounding is added, as they are."""
+    outward, plain = (down(use.range[0]), up(use.range[1])), [short(round(at, 12)) for at in use.range]
+    missed = max(abs(Fraction(text) - at) for text, at in zip(plain, use.range, strict=True))
+    if missed == 0 or missed > NOTHING:
+        return " to ".join(outward)
+    return f"{' to '.join(dict.fromkeys(plain))}, within {short(NOTHING)}"
 
 
 def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
@@ -154,7 +174,7 @@ def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     for lack in result.lacks:
         if lack.where in notes.filled:
             yield f"fills {lack.where}", filling(notes.filled[lack.where])
-        yield "help", remedy(lack, notes)
+        yield "help", remedy(lack, result.spec.effective, notes)
 
 
 def _origin(certificate: Certificate) -> Facts:

@@ -11,10 +11,11 @@ from fractions import Fraction
 from typing import Final
 
 from tubecert.certificate.effective import Effective, Tree
-from tubecert.digits import end, short, up
+from tubecert.digits import end, in_unit, short, up
 from tubecert.sampled_loop.record import Lack, Missing, Notes, Result, Shares
 from tubecert.verdict import Verdict
 
+NOTHING: Final = 1e-12  # half-widths and deviations below it, in any unit, are of rounding alone
 SHARES: Final[Mapping[str, str]] = {
     "noise": "noise",
     "holding": "delay and holding",
@@ -45,8 +46,14 @@ _WHY: Final[Mapping[Missing, tuple[str, str]]] = {  # and what is added where it
     "wish": ("the tube of {where} is wider than wished for", ": {needed} of {allowed}"),
     "not_proven": ("what was found in floats is not proven", ""),
 }
+_ALONE: Final[Mapping[Missing, tuple[str, str]]] = {  # the same with controller: none
+    "no_design": ("without a controller a mode of {where} does not die away", ": it grows by {needed} 1/s"),
+    "no_fixed_point": ("without a controller no tube closes: that of {where} widens ever more", ""),
+}
+_FASTER: Final = "a higher hardware.rate, a shorter hardware.delay, less noise, wind or h, or wider limits"
+_AUTO: Final = "controller: auto; without one every mode must die away by itself"
 _HELP: Final[Mapping[Missing, str]] = {
-    "no_design": "an input or a sensor for that mode, a higher hardware.rate, or a shorter hardware.delay",
+    "no_design": "an input or a sensor for that mode of {where}",
     "no_fixed_point": "a nearer start, less noise, wind or h, a higher hardware.rate, or a plan that moves less",
     "inputs": "wider limits, a plan that uses less of them, or less of what asks most: {largest}",
     "safe_set": "a larger safe_set, a plan farther from its sides, or less of what fills the tube",
@@ -63,8 +70,7 @@ def promise(result: Result) -> str:
     """What the verdict says, as a sentence without its subject."""
     if result.verdict is Verdict.CERTIFIED:
         return f"the state stays in the tube around {plan(result)} {extent(result)}"
-    units = result.spec.effective.system.units
-    return "; ".join(why(lack, units) for lack in result.lacks) or "nothing is proven"
+    return "; ".join(why(lack, result.spec.effective) for lack in result.lacks) or "nothing is proven"
 
 
 def plan(result: Result) -> str:
@@ -86,27 +92,39 @@ def extent(result: Result) -> str:
     return "for all t >= 0" + (f", {told} {short(last, 12)} s" if told and last is not None else "")
 
 
-def why(lack: Lack, units: Mapping[str, str]) -> str:
+def why(lack: Lack, effective: Effective) -> str:
     """Why nothing is certified, with numbers in the unit of what lacks."""
-    unit = units.get(lack.where, "")
+    unit = effective.system.units.get(lack.where, "")
     needed, allowed = (f"{up(number)} {unit}".rstrip() for number in (lack.needed, lack.allowed))
-    sentence, more = _WHY[lack.kind]
+    sentence, more = (_ALONE if _is_alone(effective) else _WHY).get(lack.kind, _WHY[lack.kind])
     text = sentence if lack.needed is None else sentence + more
     return text.format(where=lack.where, needed=needed, allowed=allowed).removesuffix(": ")
 
 
-def remedy(lack: Lack, notes: Notes) -> str:
+def remedy(lack: Lack, effective: Effective, notes: Notes) -> str:
     """What would help, by what fills the quantity that lacks."""
+    if lack.kind in _ALONE and _is_alone(effective):
+        return _AUTO
     filled = notes.filled.get(lack.where)
     most = "" if filled is None else max(SHARES, key=lambda name: float(getattr(filled, name)))
-    return _HELP[lack.kind].format(largest=SHARES.get(most, "noise, wind, h or delay"))
+    help = _HELP[lack.kind] if lack.where or lack.kind != "no_design" else _FASTER
+    return help.format(where=lack.where, largest=SHARES.get(most, "noise, wind, h or delay"))
+
+
+def _is_alone(effective: Effective) -> bool:
+    return effective.data.get("controller") == "none"
+
+
+def size(bound: Fraction) -> str:
+    """A half-width or a deviation, rounded up; what is as good as nothing is said in one way."""
+    return f"< {short(NOTHING)}" if 0 < bound < NOTHING else up(bound)
 
 
 def percents(shares: Shares) -> dict[str, int]:
-    """Whole per cents by the words of the shares, which add up to 100; what is nothing is left out."""
+    """Whole per cents by the words of the shares, which add up to 100, or to 0; what is nothing is left out."""
     parts = {SHARES[item.name]: float(getattr(shares, item.name)) for item in fields(shares)}
     whole = sum(parts.values())
-    if whole <= 0:
+    if whole < NOTHING:
         return {}
     exact = {name: 100 * part / whole for name, part in parts.items()}
     found = {name: int(part) for name, part in exact.items()}
@@ -163,7 +181,7 @@ def assumed(result: Result) -> Iterator[str]:
 
 def _delay(told: str) -> str:
     """A time, or words."""
-    return f"{end(Fraction(told))} s" if told[:1].isdigit() or told[:1] == "." else told
+    return f"{short(told, 6)} s" if told[:1].isdigit() or told[:1] == "." else told
 
 
 def _noise(told: Tree, units: Mapping[str, str]) -> str:
@@ -172,5 +190,5 @@ def _noise(told: Tree, units: Mapping[str, str]) -> str:
         return "0" if Fraction(told) == 0 else f"{end(Fraction(told))} (length)"
     alike: dict[str, list[str]] = {}
     for name, size in told.items():
-        alike.setdefault(f"{end(Fraction(size))} {units.get(name, '')}".rstrip(), []).append(name)
+        alike.setdefault(in_unit(end(Fraction(size)), units.get(name, "")), []).append(name)
     return ", ".join(f"{', '.join(names)} {size}" for size, names in alike.items())
