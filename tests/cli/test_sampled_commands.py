@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -44,7 +45,7 @@ def stand_in(monkeypatch):
     def certify(spec, *, settings=None, report=None, command=""):
         lacks = [Lack(kind="inputs", where="F", needed=9.0, allowed=2.0)] if spec.limits[0][1][1] < 3 else []
         text = spec.source.replace("rate: 500", f"rate: {1 / spec.hardware.sample_time}")
-        return sampled.undecided(*lacks) if lacks else sampled.certificate(text, settings)
+        return sampled.undecided(*lacks, settings=settings) if lacks else sampled.certificate(text, settings)
 
     monkeypatch.setattr(certification, "certify", certify)
 
@@ -145,7 +146,9 @@ def test_sweep_keeps_one_for_every_point():
     done = run(*asked, "-o", "s")
     assert done.exit_code == 0, done.output
     assert "2 certified" in done.stdout
-    assert "p 0.1321, v 0.1321" in done.stdout
+    assert "verdict    half-widths, or what lacks" in done.stdout
+    assert "p 0.1321, v 0.1321; in the long run p 0.034" in done.stdout
+    assert "half-widths, or what lacks" in Path("s/sweep.html").read_text()
     rows = Path("s/table.csv").read_text().splitlines()
     assert "half_width.p" in rows[0]
     assert len(rows) == 3
@@ -153,6 +156,25 @@ def test_sweep_keeps_one_for_every_point():
     refused = run(*asked, "--conditions", "B", "-o", "t")
     assert refused.exit_code == 2
     assert "--conditions is about a certificate with a metric" in refused.stderr
+    narrow = run(*asked, "--set", "limits.F=[-2,2]", "-o", "u").stdout
+    assert "the input F has too little room" in " ".join(narrow.split())
+
+
+@pytest.mark.slow
+def test_a_swept_rate_is_drawn(monkeypatch):
+    """A tube that is narrower at a higher rate: half-widths of both states in one figure, now and in the long run."""
+
+    def certify(spec, *, settings, **_):
+        text = spec.source.replace("rate: 500", f"rate: {1 / spec.hardware.sample_time}")
+        scale, (own, *_) = spec.hardware.sample_time * 500, sampled.certificate().result.tube
+        widths = {name: scale * width for name, width in own.half_widths.items()}
+        stages = replace(own, half_widths=widths), replace(own, start=9, half_widths=widths)
+        return sampled.certificate(text, settings, tube=stages)
+
+    monkeypatch.setattr(certification, "certify", certify)
+    run("sweep", "cart.yaml", "--over", "hardware.rate=200:500:4", "-o", "s")
+    assert {"half_width.svg", "half_width_in_the_long_run.svg"} <= set(os.listdir("s/figures"))
+    assert "half width of v" in Path("s/sweep.html").read_text()
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from tubecert.certificate import seal
 from tubecert.certificate.result import Certificate, Result
-from tubecert.digits import down, end, exact, percent, short, up
+from tubecert.digits import down, end, exact, in_unit, percent, short, up
 from tubecert.findings import Finding, Location, Severity
 from tubecert.records import to_json
 from tubecert.report import console, findings
@@ -219,10 +219,16 @@ def test_pipes_have_a_fixed_width():
         assert Terminal.of(StringIO(), None, {"COLUMNS": columns}).width == width
 
 
-def test_an_end_of_a_range_is_exact_unless_it_is_a_multiple_of_pi():
+def test_an_end_of_a_range_is_exact_and_a_multiple_of_pi_in_degrees():
     assert end(Fraction(-1, 10)) == "-0.1"
     assert end(Fraction(1, 3)) == "1/3"
-    assert end(Fraction("0.5235987755982988730771072305")) == "0.523598775598"
+    assert end(Fraction("0.5235987755982988730771072305")) == "30 deg"
+    assert end(Fraction("0.5235987755982988730801072305")) == "0.523598775598"
+    assert (in_unit("30 deg", "rad/s"), in_unit("30 deg", "1/s"), in_unit("3", "")) == (
+        "30 deg/s",
+        "30 deg 1/s",
+        "3",
+    )
 
 
 def test_a_rho_a_that_is_cut_down_is_told():

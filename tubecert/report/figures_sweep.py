@@ -63,7 +63,8 @@ def _value(row: Row, quantity: Quantity) -> float | None:
     if found is None:
         return None
     if not quantity.section:
-        return None if row.value("rho_r") is None else found.number
+        held = row.verdict == Verdict.CERTIFIED or row.value("rho_r") is not None
+        return found.number if held else None
     return found.number if row.value(f"{quantity.section}.verdict") == Verdict.CERTIFIED else None
 
 

@@ -19,6 +19,7 @@ from tubecert.report.quantities import Quantity, Value, failed, merged, quantiti
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sweep.grid import Axis
 from tubecert.sweep.point import Failed, Kept, Point
+from tubecert.words.sampled_loop import promise, size
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -41,6 +42,7 @@ class Row:
     found: Mapping[str, Quantity]
     gains: str = ""
     broken: bool = False  # by a defect of tubecert
+    sampled: bool = False  # a sampled loop, which has no gains
 
     @classmethod
     def of(cls, point: Point, outcome: Kept) -> Row:
@@ -54,9 +56,10 @@ class Row:
             point=point,
             verdict=str(result.verdict),
             failed=failed(result),
-            why="",
+            why=promise(outcome.result) if isinstance(outcome, SampledCertificate) else "",
             found={each.key: each for each in quantities(result)},
             gains=_found(outcome),
+            sampled=isinstance(outcome, SampledCertificate),
         )
 
     @property
@@ -98,6 +101,22 @@ class SweepTable:
             keys = [each.text for each in row.point.settings]
             yield [*keys, row.verdict, row.failed, *(row.value(each.key) for each in self.columns), row.file]
 
+    @property
+    def headings(self) -> tuple[str, ...]:
+        """What a person sees of a row beside its keys."""
+        if any(row.sampled for row in self.rows):
+            return "verdict", "half-widths, or what lacks"
+        return "verdict", "rho", "gains, or what failed"
+
+    def texts(self, row: Row) -> list[str]:
+        """The keys of a row, and what stands below the headings."""
+        rho, said = row.value("rho"), row.why or row.failed if row.failed else row.gains
+        shown = {"verdict": row.verdict, "rho": "" if rho is None or isinstance(rho, str) else up(rho)}
+        return [
+            *(each.text for each in row.point.settings),
+            *(shown.get(head, said) for head in self.headings),
+        ]
+
     def count(self, verdict: str) -> int:
         """How many points have a verdict."""
         return sum(row.verdict == verdict for row in self.rows)
@@ -133,7 +152,10 @@ class SweepTable:
 def _found(outcome: Certificate | SampledCertificate) -> str:
     """The gains that decide; of a sampled loop, whose controller has none, the half-widths."""
     if isinstance(outcome, SampledCertificate):
-        return ", ".join(f"{name} {up(width)}" for name, width in outcome.result.half_widths.items())
+        proven = outcome.result.half_widths
+        later = [stage.half_widths for stage in outcome.result.tube[1:][-1:] if proven]
+        told = (", ".join(f"{name} {size(width)}" for name, width in own.items()) for own in (proven, *later))
+        return "; in the long run ".join(told)
     return "; ".join(row.text() for row in deciding(outcome.result))
 
 
@@ -167,12 +189,10 @@ def summary(table: SweepTable) -> Text:
 def report(table: SweepTable, files: Sequence[str]) -> list[RenderableType]:
     """The summary, the first rows, and what was written."""
     keys = [f">{axis.path}" for axis in table.axes]
-    rows = plain_table(*keys, "verdict", ">rho", "gains, or half-widths", wrapped=len(keys) + 2)
+    heads = [f">{head}" if head == "rho" else head for head in table.headings]
+    rows = plain_table(*keys, *heads, wrapped=len(keys) + len(heads) - 1)
     for row in table.rows[:_SHOWN]:
-        own = [each.text for each in row.point.settings]
-        rho = row.value("rho")
-        said = row.gains if not row.failed else row.why or row.failed
-        rows.add_row(*own, row.verdict, "" if rho is None or isinstance(rho, str) else up(rho), Text(said))
+        rows.add_row(*map(Text, table.texts(row)))
     parts: list[RenderableType] = [summary(table), Text(), rows]
     if len(table.rows) > _SHOWN:
         parts.append(Text(f"... and {len(table.rows) - _SHOWN} more, in the table", style="dim"))

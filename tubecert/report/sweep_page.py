@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tubecert.digits import up
 from tubecert.report.figures_sweep import sweep_figures
-from tubecert.report.page import Block, Cell, Figures, Page, Section, Table, Words
+from tubecert.report.page import Block, Cell, Figures, Kind, Page, Section, Table, Words
 from tubecert.report.sweep import SweepTable, summary
 
 _MOST = 500  # rows on the page
@@ -36,13 +35,15 @@ def page_of_sweep(table: SweepTable) -> Page:
 
 
 def _points(table: SweepTable) -> Iterator[Block]:
-    columns = (*(axis.path for axis in table.axes), "verdict", "rho", "gains, or what failed")
-    rows = []
-    for row in table.rows[:_MOST]:
-        rho = row.value("rho")
-        keys = [Cell(text=each.text, kind="number") for each in row.point.settings]
-        shown = Cell(text="" if rho is None or isinstance(rho, str) else up(rho), kind="number")
-        said = Cell(text=row.gains if not row.failed else row.why or row.failed)
-        rows.append((*keys, Cell(text=row.verdict, kind="verdict"), shown, said))
+    columns = (*(axis.path for axis in table.axes), *table.headings)
+    kinds: dict[str, Kind] = {axis.path: "number" for axis in table.axes}
+    kinds |= {"rho": "number", "verdict": "verdict"}
+    rows = [
+        tuple(
+            Cell(text=text, kind=kinds.get(column, "text"))
+            for column, text in zip(columns, table.texts(row), strict=True)
+        )
+        for row in table.rows[:_MOST]
+    ]
     left = len(table.rows) - len(rows)
     yield Table(columns=columns, rows=tuple(rows), note=f"{left} more are in table.csv" if left else "")
