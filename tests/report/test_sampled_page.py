@@ -174,6 +174,34 @@ def test_the_page_is_one_page_with_figures_and_the_same_words():
     assert page.summary.replace(">=", "≥") in text
 
 
+def test_the_page_has_the_equations_of_the_loop_and_how_to_check_it():
+    text = markdown.render_page(page_of(sampled.certificate()))
+    for told in (
+        "v' = -v + (F + h) + w",
+        "u = u* + M z_k + N (y_k - x*(t_k)),   held from t_k + 0.0005 s on for 0.002 s",
+        "recheck cart.certificate.json --spec SPEC.yaml",
+        "recheck cart.certificate.json --controller FOLDER",
+    ):
+        assert told in text
+    renamed = sampled.SPEC.replace("v", "w")
+    assert "w' = -w + (F + h) + wind" in markdown.render_page(page_of(sampled.certificate(renamed)))
+    alone = markdown.render_page(page_of(sampled.certificate(sampled.SPEC + "controller: none\n")))
+    assert "--spec" in alone
+    assert not [told for told in ("--controller", "z_k") if told in alone]
+
+
+def test_how_far_from_its_plan_is_drawn_where_the_plan_moves():
+    still, family = (
+        figures_of(page_of(sampled.certificate(text))) for text in (sampled.SPEC, sampled.FAMILY)
+    )
+    assert {"deviation-0", "deviation-1", "shares"} == set(family)
+    assert not [key for key in still if key.startswith("deviation")]
+    assert [words for _, words in family["deviation-0"].legend] == ["wish", "proven in the loop", "plan"]
+    svg = ET.fromstring(family["deviation-1"].svg)
+    (band,) = (each.get("d") for each in svg.iter() if each.get("class") == "tube")
+    assert len(set(re.findall(r"[ML][\d.]+[ ,]([\d.]+)", band))) == 4  # both sides, of both stages
+
+
 def test_a_band_is_drawn_as_proven_where_it_is():
     for certificate, other in (sampled.certificate(), "unproven"), (sampled.undecided(LACKS["wish"]), "tube"):
         drawn = figures_of(page_of(certificate)).values()

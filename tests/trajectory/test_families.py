@@ -364,11 +364,12 @@ def test_a_plan_of_ones_own_is_followed_if_it_is_of_the_family(tmp_path, monkeyp
 
 def test_the_report_names_the_family(document):
     from tubecert.certificate.result import Certificate
-    from tubecert.report.claimed import family_words, plan_words
+    from tubecert.report.claimed import plan_words
+    from tubecert.words.sampled_loop import family
 
     result = Certificate.from_json(document).result
     assert plan_words(result) == "every plan of the family"
-    assert family_words(result.claim.plans) == (
+    assert family(result.spec.effective) == (
         "x1* in [-1, 1], x2* in [-0.5, 0.5], u* in [-1, 1]; |x*' - f(x*) - B(x*) u*| <= 0.01"
     )
 

@@ -11,7 +11,7 @@ from tubecert.digits import end, in_unit, short
 from tubecert.records import to_json
 
 if TYPE_CHECKING:
-    from tubecert.certificate.result import Plans, Result
+    from tubecert.certificate.result import Result
     from tubecert.enclosure.constant import Witness
 
 NOT_RECHECKED = (
@@ -55,13 +55,6 @@ def _place(low: str, high: str) -> str:
     """`= 0.1`, or `in [0, 0.1]`; with pi in it, a number is a range as wide as its 30th digit."""
     a, b = end(Fraction(low)), end(Fraction(high))
     return f"= {a}" if a == b else f"in [{a}, {b}]"
-
-
-def family_words(plans: Plans) -> str:
-    """Which plans belong to a family."""
-    sides = [*((f"{name}*", ends) for box in (plans.x, plans.u) for name, ends in box.items())]
-    boxes = ", ".join(f"{name} in [{low}, {high}]" for name, (low, high) in sides)
-    return f"{boxes}; |x*' - f(x*) - B(x*) u*| <= {plans.defect}"
 
 
 def horizon(result: Result) -> Fraction | None:

@@ -62,6 +62,8 @@ def figures(certificate: Certificate) -> Iterator[Figure]:
         style = "tube" if result.verdict is Verdict.CERTIFIED else "unproven"
         yield from (each.figure(style) for each in _over_time(certificate, t, x, widths))
         yield from _planes(result, x, widths)
+    if result.tube and result.spec.effective.trajectory.kind != "equilibrium":
+        yield from _deviations(result)
     if certificate.notes.filled:
         yield _bars(certificate.notes.filled)
 
@@ -90,6 +92,27 @@ def _over_time(certificate: Certificate, t: Array, x: Array, widths: Array) -> I
         curve = np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])
         ends = (np.full(t.shape, float(use.range[0])), np.full(t.shape, float(use.range[1])))
         yield drawing(f"input-{i}", use.input, curve, ends, use.limits)
+
+
+def _deviations(result: Result) -> Iterator[Figure]:
+    """What each state may be off its plan over time: of a plan that moves, too little to be seen beside it."""
+    proven, effective = result.verdict is Verdict.CERTIFIED, result.spec.effective
+    starts = [float(stage.start * period(result)) for stage in result.tube]
+    last = result.claim.horizon
+    ends = pairwise([*starts, starts[-1] + _FOR_EVER if last is None else float(last)])
+    t = np.array([at for pair in ends for at in pair])
+    for i, name in enumerate(effective.system.states):
+        widths = np.repeat([float(stage.half_widths[name]) for stage in result.tube], 2)
+        wish = effective.tube.half_widths.get(name)
+        yield Drawing(
+            key=f"deviation-{i}",
+            name=f"{name} - {name}*",
+            unit=effective.system.units.get(name, ""),
+            curve=_points(t, 0 * t),
+            band=(_points(t, -widths), _points(t, widths)),
+            limits=None if wish is None else (-float(wish), float(wish)),
+            words=("wish", "proven in the loop" if proven else "not proven", "plan"),
+        ).figure("tube" if proven else "unproven")
 
 
 def _planes(result: Result, x: Array, widths: Array) -> Iterator[Figure]:

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from tubecert.certificate.effective import Effective, TableView
-from tubecert.certificate.result import Certificate, Result
 from tubecert.digits import end, exact
 from tubecert.records import to_json
-from tubecert.report.claimed import family_words
 from tubecert.report.mathml import Equation, aligned
 from tubecert.report.page import Block, Cell, Facts, Listing, Words
-from tubecert.report.reach import safe_set
+from tubecert.words.sampled_loop import family
+
+if TYPE_CHECKING:
+    from tubecert.certificate.result import Certificate
 
 _POINTS = 8  # of a table
 
 
-def system(result: Result) -> Iterator[Block]:
-    """The effective specification in words and equations."""
-    effective = result.spec.effective
+def system(effective: Effective, overrides: Mapping[str, object]) -> Iterator[Block]:
+    """The effective specification in equations and words."""
     found = tuple(dynamics(effective))
     yield Listing(text="\n".join(each.text for each in found), math=aligned(found))
-    yield Facts(facts=tuple(_facts(result, effective)))
+    yield Facts(facts=tuple(_facts(effective, overrides)))
 
 
 def equations(effective: Effective) -> Iterator[str]:
@@ -33,19 +35,24 @@ def equations(effective: Effective) -> Iterator[str]:
 def dynamics(effective: Effective) -> Iterator[Equation]:
     """The dynamics, one equation per state, then h."""
     model, wind = effective.system, effective.disturbance.E
-    told = [f"({u} + {h})" for u, h in zip(model.inputs, _named("h", model.inputs), strict=True)]
+    taken = {*model.states, *model.inputs}
+    hs = _named(("h", "uncertainty"), model.inputs, taken)
+    told = [f"({u} + {h})" for u, h in zip(model.inputs, hs, strict=True)]
     for i, (state, f, row) in enumerate(zip(model.states, model.f, model.B, strict=False)):
         terms = [_times(b, u) for b, u in zip(row, told, strict=True) if b != "0"]
         blows = wind[i] if wind else ()
-        terms += [_times(e, w) for e, w in zip(blows, _named("w", blows), strict=True) if e != "0"]
+        terms += [
+            _times(e, w) for e, w in zip(blows, _named(("w", "wind"), blows, taken), strict=True) if e != "0"
+        ]
         yield Equation(left=state, right=(f, *terms), rate=True)
-    for name, h in zip(_named("h", effective.uncertainty.h), effective.uncertainty.h, strict=True):
+    for name, h in zip(hs, effective.uncertainty.h, strict=False):  # none where only bounds are declared
         yield Equation(left=name, right=(h,))
 
 
-def _named(letter: str, items: Sequence[str]) -> list[str]:
-    """A name for each: the letter alone where there is one, else with its number."""
-    return [letter] if len(items) == 1 else [f"{letter}{i + 1}" for i in range(len(items))]
+def _named(words: Sequence[str], items: Sequence[str], taken: Collection[str]) -> list[str]:
+    """A name for each, of the first word that is free: alone where there is one, else with its number."""
+    made = [[word if len(items) == 1 else f"{word}{i + 1}" for i in range(len(items))] for word in words]
+    return next((found for found in made if not set(found) & set(taken)), made[-1])
 
 
 def _times(factor: str, other: str) -> str:
@@ -53,7 +60,7 @@ def _times(factor: str, other: str) -> str:
     return other if factor == "1" else f"({factor})*{other}"
 
 
-def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:
+def _facts(effective: Effective, overrides: Mapping[str, object]) -> Iterator[tuple[str, Cell]]:
     model = effective.system
     if model.parameters:
         yield "parameters", Cell(text=_list(model.parameters))
@@ -61,19 +68,19 @@ def _facts(result: Result, effective: Effective) -> Iterator[tuple[str, Cell]]:
         yield f"table {name}", Cell(text=_points(table))
     if model.units:
         yield "units", Cell(text=", ".join(f"{name}: {unit}" for name, unit in sorted(model.units.items())))
-    box = (f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in safe_set(result))
-    yield "safe set", Cell(text=", ".join(box))
+    safe = effective.part("safe_set")
+    sides = [(name, map(end, map(Fraction, safe[name]))) for name in model.states if name in safe]
+    yield "safe set", Cell(text=", ".join(f"{name} in [{', '.join(ends)}]" for name, ends in sides))
     if bounds := effective.uncertainty.bounds:
         yield "bounds declared", Cell(text=_list(bounds))
-    plans = result.claim.plans
-    words = _plan(effective.part("trajectory")) if plans is None else f"any with {family_words(plans)}"
-    yield "plan", Cell(text=words)
-    for name, words in (("initial_state", "initial state"), ("adaptation", "adaptation")):
+    told, any_of = effective.part("trajectory"), effective.trajectory.kind == "any"
+    yield "plan", Cell(text=f"any with {family(effective)}" if any_of else _plan(told))
+    for name in ("initial_state", "adaptation", "hardware"):
         if part := effective.part(name):
-            yield words, Cell(text=_list(part))
+            yield name.replace("_", " "), Cell(text=_list(part))
     for obstacle in effective.parts("obstacles"):
         yield "obstacle", Cell(text=_list(obstacle))
-    if overrides := to_json(result.overrides):
+    if overrides:
         yield "overridden by the command", Cell(text=_list(overrides))
 
 
@@ -126,17 +133,17 @@ def provenance(certificate: Certificate) -> Iterator[Block]:
     yield Facts(facts=tuple(facts))
 
 
-def check_again(certificate: Certificate) -> Iterator[Block]:
-    """How a stranger convinces himself."""
-    name = shlex.quote(f"{certificate.result.spec.effective.name}.certificate.json")
+def check_again(name: str, notes: str, *more: str) -> Iterator[Block]:
+    """How a stranger convinces himself; `notes` are computed only, `more` follows the command."""
+    file = shlex.quote(f"{name}.certificate.json")
     yield Words(
         text="This page shows a certificate and proves nothing itself. The certificate, a JSON file with the hash "
         "above, is what can be checked: without a solver, in another arithmetic, and against its specification. "
-        "Advice, curves of gains, where constants are largest and points to draw the plan by are its notes: computed, "
-        "not hashed, not examined by recheck."
+        f"{notes} are its notes: computed, not hashed, not examined by recheck."
     )
-    yield Listing(text=f"tubecert recheck {name}\ntubecert recheck {name} --spec SPEC.yaml")
+    options = ("", " --spec SPEC.yaml", *more)
+    yield Listing(text="\n".join(f"tubecert recheck {file}{option}" for option in options))
     yield Words(
         text="The command above, run again on the same machine with the same versions, gives the same hash; "
-        "elsewhere numbers may differ within the gap."
+        "elsewhere numbers may differ."
     )

@@ -12,6 +12,7 @@ from tubecert.bounds.meanings import EVERY, meaning
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
+from tubecert.records import to_json
 from tubecert.report import claimed, console, reach, sections
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_time import input_figures, state_figures
@@ -56,6 +57,7 @@ _SHARES = (
     "makes the tube wide; a better plan or model helps there. What is missing to 100 % is the margin. The gains of "
     "each certificate were chosen by themselves, so columns need not agree."
 )
+_NOTES = "Advice, curves of gains, where constants are largest and points to draw the plan by"
 _NO_LIMITS = (
     "The specification gives no limits of the inputs, so nothing is claimed of them: the curve is the plan's."
 )
@@ -125,9 +127,14 @@ def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator
         yield Section(key="metric", title="Metric", blocks=tuple(_metric(result.metric, result.tube)))
     if result.constants:
         yield Section(key="constants", title="Constants over the tube", blocks=tuple(_constants(result)))
-    yield Section(key="system", title="The specification", blocks=tuple(system(result)))
+    yield Section(
+        key="system",
+        title="The specification",
+        blocks=tuple(system(result.spec.effective, to_json(result.overrides))),
+    )
     yield Section(key="provenance", title="Provenance", blocks=tuple(provenance(certificate)))
-    yield Section(key="check", title="Check it again", blocks=tuple(check_again(certificate)))
+    again = check_again(result.spec.effective.name, _NOTES)
+    yield Section(key="check", title="Check it again", blocks=tuple(again))
 
 
 def reasons(result: Result) -> tuple[Reason, ...]:

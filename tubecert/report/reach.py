@@ -11,10 +11,11 @@ from rich.text import Text
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, near, percent, short, up
-from tubecert.report.claimed import family_words, horizon, radius, start_words
+from tubecert.report.claimed import horizon, radius, start_words
 from tubecert.report.gains import NAMES
 from tubecert.trajectory.hermite import ends_of_pieces
 from tubecert.verdict import Verdict
+from tubecert.words.sampled_loop import family
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -31,7 +32,7 @@ def tube_lines(result: Result, tube: TubeData) -> list[RenderableType]:
     if tube.coordinates is None and len(result.spec.effective.system.states) > 1:
         lines[0] += " (Euclidean norm over all states)"
     if result.claim.plans is not None:
-        lines.append(f"around every plan with {family_words(result.claim.plans)}")
+        lines.append(f"around every plan with {family(result.spec.effective)}")
     if result.verdict is not Verdict.CERTIFIED:  # else it stands in the sentence above
         lines.append(f"for a state that starts {start_words(result)}")
     if tube.half_widths:

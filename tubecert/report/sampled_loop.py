@@ -9,19 +9,23 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import Final
 
+from tubecert.certificate.effective import Effective
 from tubecert.digits import down, near, short, up
 from tubecert.report.claimed import NOT_RECHECKED, started
 from tubecert.report.figures_sampled import figures, period
-from tubecert.report.page import Block, Cell, Facts, Figures, Items, Page, Section, Table, Tile
+from tubecert.report.page import Block, Cell, Facts, Figures, Items, Listing, Page, Section, Table, Tile
+from tubecert.report.page_origin import check_again, system
 from tubecert.report.page_simulation import Simulated, simulated_blocks
 from tubecert.sampled_loop.record import Certificate, InputUse, Notes, Result
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import (
     NOTHING,
     assumed,
+    delay,
     extent,
     family,
     filling,
+    is_alone,
     loop,
     plan,
     promise,
@@ -31,32 +35,42 @@ from tubecert.words.sampled_loop import (
 
 _MOST, _ROWS = 6, 4  # states of the first screen; where there are more than four, they stand side by side
 _TILES: Final = 4
+_NOTES: Final = "What fills the tube and the points to draw the plan by"
+_LAW: Final = (
+    "y_k = x(t_k) + noise,   t_k = k * {period} s",
+    "u = u* + M z_k + N (y_k - x*(t_k)),   held from t_k + {delay} on for {period} s",
+    "z_k+1 = F z_k + G (y_k - x*(t_k)),   z_0 = 0",
+)
 
 
 def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Page:
     """The page of a certificate, whatever its verdict."""
     result, notes = certificate.result, certificate.notes
-    system, drawn = result.spec.effective.system, tuple(figures(certificate))
+    own, drawn = result.spec.effective, tuple(figures(certificate))
     sections: Sequence[tuple[str, str, Iterable[Block]]] = (
         ("loop", "The loop", _screen(result, notes)),
         ("figures", "Figures", [Figures(figures=drawn)] if drawn else []),
         (
             "tube",
             "Half-widths, and what fills them",
-            [_widths(result, system.states, notes)] if result.tube else [],
+            [_widths(result, own.system.states, notes)] if result.tube else [],
         ),
         ("simulation", "Simulation", [] if simulated is None else simulated_blocks(simulated)),
         ("assumed", "Assumed, not proven", [Items(items=tuple(assumed(result)))]),
+        ("system", "The specification", [*system(own, result.spec.settings), *_law(own)]),
         ("origin", "Where it comes from", [_origin(certificate)]),
+        ("check", "Check it again", _again(own)),
     )
     found = (Section(key=key, title=title, blocks=tuple(blocks)) for key, title, blocks in sections)
     return Page(
-        name=result.spec.effective.name,
+        name=own.name,
         verdict=result.verdict,
         summary=promise(result),
         meaning=f"{_meaning(result)} {NOT_RECHECKED}",
         tiles=tuple(
-            Tile(symbol=name, value=f"±{size(width)}", unit=system.units.get(name, ""), words="half-width")
+            Tile(
+                symbol=name, value=f"±{size(width)}", unit=own.system.units.get(name, ""), words="half-width"
+            )
             for name, width in [*result.half_widths.items()][:_TILES]
         ),
         sections=tuple(section for section in found if section.blocks),
@@ -175,6 +189,18 @@ def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
         if lack.where in notes.filled:
             yield f"fills {lack.where}", filling(notes.filled[lack.where])
         yield "help", remedy(lack, result.spec.effective, notes)
+
+
+def _law(own: Effective) -> Iterator[Listing]:
+    """What the computer does, if there is a controller."""
+    if not is_alone(own):
+        told = own.part("hardware")
+        period = short(told["sample_time"], 6)
+        yield Listing(text="\n".join(_LAW).format(period=period, delay=delay(told["delay"])))
+
+
+def _again(own: Effective) -> Iterator[Block]:
+    return check_again(own.name, _NOTES, *([] if is_alone(own) else [" --controller FOLDER"]))
 
 
 def _origin(certificate: Certificate) -> Facts:

@@ -96,14 +96,14 @@ def why(lack: Lack, effective: Effective) -> str:
     """Why nothing is certified, with numbers in the unit of what lacks."""
     unit = effective.system.units.get(lack.where, "")
     needed, allowed = (f"{up(number)} {unit}".rstrip() for number in (lack.needed, lack.allowed))
-    sentence, more = (_ALONE if _is_alone(effective) else _WHY).get(lack.kind, _WHY[lack.kind])
+    sentence, more = (_ALONE if is_alone(effective) else _WHY).get(lack.kind, _WHY[lack.kind])
     text = sentence if lack.needed is None else sentence + more
     return text.format(where=lack.where, needed=needed, allowed=allowed).removesuffix(": ")
 
 
 def remedy(lack: Lack, effective: Effective, notes: Notes) -> str:
     """What would help, by what fills the quantity that lacks."""
-    if lack.kind in _ALONE and _is_alone(effective):
+    if lack.kind in _ALONE and is_alone(effective):
         return _AUTO
     filled = notes.filled.get(lack.where)
     most = "" if filled is None else max(SHARES, key=lambda name: float(getattr(filled, name)))
@@ -111,7 +111,8 @@ def remedy(lack: Lack, effective: Effective, notes: Notes) -> str:
     return help.format(where=lack.where, largest=SHARES.get(most, "noise, wind, h or delay"))
 
 
-def _is_alone(effective: Effective) -> bool:
+def is_alone(effective: Effective) -> bool:
+    """Whether there is to be no controller."""
     return effective.data.get("controller") == "none"
 
 
@@ -144,7 +145,7 @@ def loop(effective: Effective) -> str:
     own, units = effective.part("hardware"), effective.system.units
     period = float(Fraction(own["sample_time"]))
     rate = f"{short(1 / period, 6)} Hz" if period < 1 else f"every {short(period, 6)} s"
-    return f"{rate}, delay {_delay(own['delay'])}, noise {_noise(own['noise'], units)}"
+    return f"{rate}, delay {delay(own['delay'])}, noise {_noise(own['noise'], units)}"
 
 
 def family(effective: Effective) -> str:
@@ -153,7 +154,7 @@ def family(effective: Effective) -> str:
     sides = [(name, ends) for box in ("x", "u") for name, ends in told.get(box, {}).items()]
     boxes = ", ".join(f"{name}* in [{', '.join(end(Fraction(at)) for at in ends)}]" for name, ends in sides)
     rates = [f"|{name}*'| <= {end(Fraction(rate))}" for name, rate in told.get("input_rate", {}).items()]
-    return "; ".join([boxes, *rates, f"|x*' - f - B u*| <= {end(Fraction(told.get('defect', '0')))}"])
+    return "; ".join([boxes, *rates, f"|x*' - f(x*) - B(x*) u*| <= {end(Fraction(told.get('defect', '0')))}"])
 
 
 def assumed(result: Result) -> Iterator[str]:
@@ -179,8 +180,8 @@ def assumed(result: Result) -> Iterator[str]:
         yield "the wind is within its bound, and otherwise arbitrary"
 
 
-def _delay(told: str) -> str:
-    """A time, or words."""
+def delay(told: str) -> str:
+    """A time, or `one sample`."""
     return f"{short(told, 6)} s" if told[:1].isdigit() or told[:1] == "." else told
 
 
