@@ -7,20 +7,15 @@ from collections.abc import Iterator
 from tubecert.checking.expectations import Claim, Outcome
 from tubecert.sampled_loop.record import Certificate, Result
 from tubecert.spec.settings import WIDTHS
-from tubecert.words.sampled_loop import remedy, why
+from tubecert.words.sampled_loop import lacking
 
 
 def outcome(certificate: Certificate) -> Outcome:
     """The verdict, half-widths, what the inputs use of their room, and why it is not certified."""
-    result, notes, effective = certificate.result, certificate.notes, certificate.result.spec.effective
+    result = certificate.result
     lacks = [
-        Claim(
-            name=lack.kind,
-            verdict=result.verdict,
-            message=why(lack, effective),
-            relax=remedy(lack, effective, notes),
-        )
-        for lack in result.lacks
+        Claim(name=kind, verdict=result.verdict, message=message, relax=help)
+        for kind, message, help in lacking(result, certificate.notes)
     ]
     claims = tuple(lacks) or (Claim(name="sampled loop", verdict=result.verdict),)
     return Outcome(verdict=result.verdict, metric=None, numbers=tuple(_numbers(result)), claims=claims)

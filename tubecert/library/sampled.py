@@ -64,17 +64,11 @@ class SampledCertification(Stated):
     def reasons(self) -> tuple[Reason, ...]:
         """What is lacking, in words: `claim`, `message` and `relax` (what would help)."""
         from tubecert.report.page import Reason
-        from tubecert.words.sampled_loop import remedy, why
+        from tubecert.words.sampled_loop import lacking
 
-        effective, notes = self.result.spec.effective, self.certificate.notes
         return tuple(
-            Reason(
-                verdict=self.verdict,
-                claim=lack.kind,
-                message=why(lack, effective),
-                relax=remedy(lack, effective, notes),
-            )
-            for lack in self.result.lacks
+            Reason(verdict=self.verdict, claim=kind, message=message, relax=help)
+            for kind, message, help in lacking(self.result, self.certificate.notes)
         )
 
     @property

@@ -92,6 +92,12 @@ def extent(result: Result) -> str:
     return "for all t >= 0" + (f", {told} {short(last, 12)} s" if told and last is not None else "")
 
 
+def lacking(result: Result, notes: Notes) -> list[tuple[str, str, str]]:
+    """What lacks: its kind, why, and what would help."""
+    own = result.spec.effective
+    return [(lack.kind, why(lack, own), remedy(lack, own, notes)) for lack in result.lacks]
+
+
 def why(lack: Lack, effective: Effective) -> str:
     """Why nothing is certified, with numbers in the unit of what lacks."""
     unit = effective.system.units.get(lack.where, "")
