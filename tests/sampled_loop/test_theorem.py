@@ -114,7 +114,7 @@ def test_noise_by_components_and_by_length(noise, both):
     )
     own = asked(loop, controller_of([[1, 1]]))
     blank = Boxes(*(np.zeros((1, k)) for k in (2, 1, 0)))
-    b = own._all(blank)[0]
+    b = own.terms(blank)[0]
     close(b[0, -1], both, 1e-6)
 
 
@@ -172,7 +172,7 @@ def test_a_start_has_signs_a_box_has_none_and_a_ball_its_length():
     """delta = 3 x + 4 v."""
     for start, size in (("{at: [4, -3]}", 0), ("{box: {x: [-1, 1], v: [-1, 1]}}", 7), ("{within: 1}", 5)):
         loop = loop_of(**{**DOUBLE, "initial_state": start}, A=[[0, 1], [0, 0]], B=[[0], [1]])
-        close(asked(loop, controller_of([[3, 4]]))._first(np.arange(2))[0, -1], size)
+        close(asked(loop, controller_of([[3, 4]])).first(np.arange(2))[0, -1], size)
 
 
 def test_tail():
@@ -257,7 +257,7 @@ def test_rounding_of_singles():
     boxes = Boxes(np.array([[2.0], [0.1]]), np.zeros((2, 1)), np.array([[3.0], [9.0]]))
     unit = 2**-24
     y = unit * 1000 + 2 * unit * 2005
-    off = asked(loop)._rounding(replace(boxes, Z=np.zeros((2, 0))))
+    off = asked(loop)._rounding(boxes._replace(Z=np.zeros((2, 0))))
     close(off, [y, 4 * unit * (5 + 5 * unit + 10 * 5)], 1e-3)
     off = asked(loop, controller_of([[-10]], [[0.5]], [[3]], [[7]]))._rounding(boxes)
     close(off, [y, 5 * unit * (5 + 7 * 9 + 10 * 5), 5 * unit * (0.5 * 9 + 3 * 5)], 1e-3)
@@ -373,8 +373,8 @@ def test_what_the_rows_miss_is_counted():
     missed_slow = sum(abs(a @ eta + b - c) for a, (b, c) in zip(rows, pairwise(slow), strict=False))
     assert missed.max() > 0
     assert missed_slow.max() > 0
-    assert (missed <= own.missed_core).all()
-    assert (missed_slow <= own.missed_eta).all()
+    assert (missed <= own.now.core).all()
+    assert (missed_slow <= own.now.eta).all()
 
 
 def test_how_far_from_the_chord():
@@ -383,9 +383,8 @@ def test_how_far_from_the_chord():
     piece = Responses(loop, controller_of([[-3, -4]]), lags=1, pieces=1, panels=1).pieces[0]
     arc = TS**2 / 8
     close(piece.core, [[3 * arc, 4 * arc, 0], [0, 0, 0]])
-    close(piece.noise, [[3 * arc, 4 * arc], [0, 0]])
     close(piece.eta, [[arc], [0]])
-    close(piece.rounding, [[arc], [0]])
+    close(piece.rounding, [[3 * arc, 4 * arc, arc], [0, 0, 0]])
     late = loop_of(
         **{**DOUBLE, "hardware": "{sample_time: 0.1, delay: 0.04}"}, A=[[0, 1], [0, 0]], B=[[0], [1]]
     )
@@ -399,9 +398,12 @@ def test_chords_meet_the_box_and_noise():
     loop = loop_of(**{**DOUBLE, "hardware": machine}, A=[[0, 1], [0, 0]], B=[[0], [1]])
     own = asked(loop, controller_of([[-3, -4]]), pieces=1)
     boxes = Boxes(np.array([[0.5, 0.7]]), np.array([[9.0]]), np.zeros((1, 0)))
-    (phase,), sizes = own.phases(boxes)
+    (phase,), _ = own.phases(boxes)
     off = np.array([0.1, 0.2, 0.4])
-    close(own._between(phase, off, sizes), [[(3 * 0.61 + 4 * 0.92 + 0.4) * TS**2 / 8, 1e-30]])
+    close(
+        phase._replace(rounding=off).met(own.responses.pieces[0]),
+        [(3 * 0.61 + 4 * 0.92 + 0.4) * TS**2 / 8, 1e-30],
+    )
 
 
 def test_a_stage_begins_before_the_plan_ends():

@@ -16,7 +16,7 @@ from tubecert.digits import up
 from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.record import Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders
-from tubecert.sampled_loop.responses import Dynamics, Responses
+from tubecert.sampled_loop.responses import Dynamics
 from tubecert.sampled_loop.setting import Controller, Loop
 from tubecert.sampled_loop.theorem import MOST_LAGS, Boxes, Inequalities
 
@@ -58,14 +58,14 @@ def propose(
         windows=remainders.windows,
         parameters="slow" if loop.slow else "sudden",
     )
-    rough = _inequalities(remainders, controller, recipe)
-    found = rough.again(cuts=_cuts(rough))
+    rough = Inequalities.made(remainders, controller, recipe)
+    found = replace(rough, recipe=replace(recipe, cuts=_cuts(rough)))
     boxes = _fixed_point(found, _nothing(found), report)
     for pieces in (True, False):
         for parts in _PARTS[1:]:
             own = found.recipe
             recipe = replace(own, pieces=parts) if pieces else replace(own, panels=parts)
-            finer = _inequalities(remainders, controller, recipe)
+            finer = Inequalities.made(remainders, controller, recipe)
             gained = np.max(1 - finer.of(boxes).W / np.maximum(found.of(boxes).W, 1e-300))
             if gained < _SETTLED:
                 break
@@ -75,18 +75,17 @@ def propose(
     if many is not None and (many.W[-1] < _STEADY * many.W.max(axis=0)).any():
         found, boxes = several, many
     for share in _SHORTER:
-        fewer = found.shorter(max(1, int(share * lags)))
+        fewer = _shorter(found, max(1, int(share * lags)))
         if _within(fewer.of(boxes), boxes, 1 + _SETTLED):
             found, boxes = fewer, _fixed_point(fewer, boxes, report)
             break
     return found, _stages(loop, boxes, found.starts)
 
 
-def _inequalities(remainders: Remainders, controller: Controller, recipe: Recipe) -> Inequalities:
-    made = Responses(
-        remainders.loop, controller, lags=recipe.lags, pieces=recipe.pieces, panels=recipe.panels
-    )
-    return Inequalities(controller, recipe, (0,), made, remainders)
+def _shorter(found: Inequalities, lags: int) -> Inequalities:
+    cuts = tuple(tuple(min(cut, lags) for cut in row) for row in found.recipe.cuts)
+    recipe = replace(found.recipe, lags=lags, cuts=cuts)
+    return replace(found, recipe=recipe, responses=found.responses.shorter(lags))
 
 
 def _in_stages(found: Inequalities, report: Report | None) -> tuple[Inequalities, Boxes | None]:
@@ -97,7 +96,7 @@ def _in_stages(found: Inequalities, report: Report | None) -> tuple[Inequalities
         starts = [k for k in starts if k < loop.samples]
     if len(starts) == 1 or not (loop.start.reach.any() or loop.matched):
         return found, None
-    several = found.again(starts=starts)
+    several = replace(found, starts=tuple(starts))
     return several, _fixed_point(several, _nothing(several), report)
 
 
@@ -114,28 +113,19 @@ def _lags(loop: Loop, controller: Controller) -> int:
 
 def _cuts(inequalities: Inequalities) -> tuple[tuple[int, ...], ...]:
     """The lag from which on eta's size costs less than its rate, for every output and component."""
-    n, made = inequalities.loop.states, inequalities.responses
-    nothing = _nothing(inequalities)
-    _, sizes = inequalities.phases(nothing)
-    first = n * len(made.nodes)  # rows of e at the last node stand before it, then delta and zeta
-    rows = np.r_[first - n : first, first : made.count]
-    cost = (
-        made.rate[:, rows] * sizes.rate
-        + np.abs(made.eta[:, rows]) * sizes.size
-        - made.size[:, rows] * sizes.size
-    )
+    n, own = inequalities.loop.states, inequalities.responses
+    sizes = inequalities.remainders.sizes(np.zeros(n))
+    rate, eta, size = (each[:, n * (len(own.nodes) - 1) :] for each in (own.rate, own.eta, own.size))
+    cost = rate * sizes.rate + np.abs(eta) * sizes.size - size * sizes.size  # of e at the end, delta and zeta
     with np.errstate(all="ignore"):
         best = np.argmin(np.where(np.isfinite(cost), cost, np.inf), axis=0)
-    return tuple(tuple(int(cut) for cut in row) for row in best.reshape(len(rows), -1))
+    return tuple(map(tuple, best.tolist()))
 
 
 def _nothing(inequalities: Inequalities) -> Boxes:
     loop, stages = inequalities.loop, len(inequalities.starts)
-    return Boxes(
-        np.zeros((stages, loop.states)),
-        np.zeros((stages, loop.inputs)),
-        np.zeros((stages, inequalities.controller.size)),
-    )
+    sizes = (loop.states, loop.inputs, inequalities.controller.size)
+    return Boxes(*(np.zeros((stages, size)) for size in sizes))
 
 
 def _fixed_point(inequalities: Inequalities, boxes: Boxes, report: Report | None) -> Boxes:
@@ -156,20 +146,18 @@ def _fixed_point(inequalities: Inequalities, boxes: Boxes, report: Report | None
 
 def _kept(inequalities: Inequalities, boxes: Boxes) -> Boxes:
     """Boxes a little wider, which the inequalities map inside themselves; what is quadratic grows most."""
-    wider = Boxes(*(_WIDER * own + 1e-30 for own in (boxes.W, boxes.U, boxes.Z)))
+    wider = Boxes(*(_WIDER * own + 1e-30 for own in boxes))
     for _ in range(_STEPS):
         found = inequalities.of(wider)
         if _within(found, wider, 1 - 1e-5):
             return wider
-        pairs = ((wider.W, found.W), (wider.U, found.U), (wider.Z, found.Z))
-        wider = Boxes(*(np.maximum(old, (1 + 1e-4) * new) for old, new in pairs))
+        wider = Boxes(*(np.maximum(old, (1 + 1e-4) * new) for old, new in zip(wider, found, strict=True)))
     raise NoTubeError(wider.W[0])
 
 
 def _within(inner: Boxes, outer: Boxes, share: float) -> bool:
     """Whether boxes lie in a share of others."""
-    pairs = ((inner.W, outer.W), (inner.U, outer.U), (inner.Z, outer.Z))
-    return all(bool((a <= share * b).all()) for a, b in pairs)
+    return all(bool((a <= share * b).all()) for a, b in zip(inner, outer, strict=True))
 
 
 def _stages(loop: Loop, boxes: Boxes, starts: Sequence[int]) -> tuple[Stage, ...]:

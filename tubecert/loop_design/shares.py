@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Final
 
 import numpy as np
 
-from tubecert.enclosure.interval import Array
+from tubecert.sampled_loop.midrad import total
 from tubecert.sampled_loop.record import Notes, Shares, Stage
 from tubecert.sampled_loop.theorem import Boxes, Inequalities
 
@@ -17,27 +18,17 @@ _POINTS: Final = 401
 def explain(inequalities: Inequalities, stages: Sequence[Stage], evaluations: int) -> Notes:
     """Shares of the first and the last stage and of the inputs, constants, and points of the plan."""
     model = inequalities.loop.model
-    names = model.states, model.inputs
-    boxes = Boxes.of(stages, names, above=True)
+    boxes = Boxes.of(stages, model, above=True)
     with np.errstate(all="ignore"):
-        first = inequalities.causes(boxes, 0)
-        last = inequalities.causes(boxes, len(stages) - 1)
-    n, m = len(model.states), len(model.inputs)
-    sizes = inequalities.phases(boxes)[1]
+        first, last = (_causes(inequalities, boxes, stage) for stage in (0, len(stages) - 1))
+    n, sizes = len(model.states), inequalities.phases(boxes)[1]
+    constants = {"eta_size": sizes.size, "eta_rate": sizes.rate, "eta_first": sizes.first}
     t, x, u = _points(inequalities)
     return Notes(
-        start=dict(zip(model.states, _shares(first[:n]), strict=True)),
-        long_run=dict(zip(model.states, _shares(last[:n]), strict=True)),
-        deviations=dict(zip(model.inputs, _shares(first[n : n + m]), strict=True)),
-        constants={
-            name: tuple(map(float, values))
-            for name, values in (
-                ("eta_size", sizes.size),
-                ("eta_rate", sizes.rate),
-                ("eta_first", sizes.first),
-            )
-            if np.isfinite(values).all()
-        },
+        start=dict(zip(model.states, first, strict=False)),
+        long_run=dict(zip(model.states, last, strict=False)),
+        deviations=dict(zip(model.inputs, first[n:], strict=False)),
+        constants={name: tuple(own.tolist()) for name, own in constants.items() if np.isfinite(own).all()},
         samples_t=t,
         samples_x=x,
         samples_u=u,
@@ -45,18 +36,27 @@ def explain(inequalities: Inequalities, stages: Sequence[Stage], evaluations: in
     )
 
 
-def _shares(causes: Array) -> list[Shares]:
-    return [
-        Shares(
-            noise=float(row[0]),
-            holding=float(row[1]),
-            uncertainty=float(row[2]),
-            wind=float(row[3]),
-            start=float(row[4]),
-            remainder=float(row[5]),
-        )
-        for row in causes
+def _causes(inequalities: Inequalities, boxes: Boxes, stage: int) -> list[Shares]:
+    """What fills every e_i, then every delta_j and zeta, at the worst sample of a stage."""
+    own, loop = inequalities.responses, inequalities.loop
+    n, sizes = loop.states, inequalities.phases(boxes)[1]
+    b, direct, spread = inequalities.terms(boxes)
+    last, k = n * (len(own.nodes) - 1), np.arange(len(b))  # rows of e at the end of a sample, delta, zeta
+    lag = np.minimum(k, own.lags)
+    held, within = np.concatenate([np.zeros(n), inequalities.remainders.held]), own.direct[-1]
+    during = slice(inequalities.starts[stage], [*inequalities.starts, len(b)][stage + 1])
+    slow, start = inequalities.slow(sizes), inequalities.first(k)
+    parts = np.stack([own.now.noise + own.noise[lag], total(own.rho, held)[lag], slow, own.wind[lag], start])
+    parts, whole = parts[:, during, last:], b[during, last:].copy()
+    parts[1:4, :, :n] += np.stack([total(within.rho, held), total(within.rate, sizes.rate), within.wind])[
+        :, None
     ]
+    whole[:, :n] += direct[during, -1] + np.max(spread[during], axis=1)
+    outputs = np.arange(whole.shape[1])
+    found = parts[:, np.argmax(whole, axis=0), outputs]
+    rest = np.maximum(whole.max(axis=0) - found.sum(axis=0), 0.0)
+    names = [item.name for item in fields(Shares)]
+    return [Shares(**dict(zip(names, own, strict=True))) for own in np.vstack([found, rest]).T.tolist()]
 
 
 def _points(

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from tubecert.enclosure.interval import Array, fraction_bounds
+from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.midrad import SUMMED, TINY, Known
 
 _TERMS: Final = 18
@@ -40,11 +40,10 @@ class Exponential:
         if self._norm * s > _MOST:
             phi, whole = self.at(s / 2)
             return phi @ phi, (self._one + phi) @ whole
-        low, high = fraction_bounds(s)
-        step = self._A.times(low, high)
+        step = self._A.times(s)
         series = self._one
         for k in range(_TERMS, 0, -1):
-            series = self._one + (step @ series).times(*fraction_bounds(Fraction(1, k + 1)))
+            series = self._one + (step @ series).times(Fraction(1, k + 1))
         left = _E * float(_MOST) ** (_TERMS + 1) / factorial(_TERMS + 2) * (1 + 1e-12)
-        whole = Known(series.mid, series.rad + left).times(low, high)
+        whole = Known(series.mid, series.rad + left).times(s)
         return self._one + self._A @ whole, Known(whole.mid, whole.rad + TINY)

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Final
 
 import numpy as np
 
-from tubecert.enclosure.interval import Array, Interval
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.enclosure.linalg import midrad, product
 
 UNIT: Final = 2.0**-53
 TINY: Final = 1e-300  # covers what underflows in a product
+_ROOT_TINY: Final = 1e-150  # the same below a root
 _ROUNDED: Final = 4 * UNIT  # more than twice the error of one operation
 SUMMED: Final = 1 + 1e-12  # a sum of at most 4000 terms, none negative: 4000 u < 5e-13
 
@@ -31,6 +33,11 @@ class Known:
     def exact(cls, value: Array) -> Known:
         """Floats that are exact numbers."""
         return cls(value, np.zeros_like(value))
+
+    @classmethod
+    def zero(cls, rows: int, columns: int) -> Known:
+        """Nothing."""
+        return cls.exact(np.zeros((rows, columns)))
 
     @classmethod
     def of(cls, interval: Interval) -> Known:
@@ -67,17 +74,17 @@ class Known:
     def __sub__(self, other: Known) -> Known:
         return self + Known(-other.mid, other.rad)
 
-    def times(self, low: float, high: float) -> Known:
-        """The product with a number between two floats."""
-        middle, reach = Known.of(Interval(low, high)).pair
-        mid = self.mid * middle
-        rad = self.above * reach + self.rad * abs(middle)
+    def times(self, q: Fraction) -> Known:
+        """The product with an exact number."""
+        low, high = fraction_bounds(q)
+        mid = self.mid * low
+        rad = self.above * (high - low) + self.rad * abs(low)
         return Known(mid, rad * (1 + 2 * _ROUNDED) + _ROUNDED * np.abs(mid) + TINY)
 
-    @property
-    def pair(self) -> tuple[float, float]:
-        """Midpoint and radius of a single number."""
-        return float(self.mid), float(self.rad)
+
+def lengths(rows: Array) -> Array:
+    """Euclidean lengths of rows of numbers that are not negative, (.., 1), from above."""
+    return np.asarray(np.sqrt(np.sum(rows * rows, axis=-1, keepdims=True)) * SUMMED + _ROOT_TINY)
 
 
 def total(values: Array, weights: Array) -> Array:

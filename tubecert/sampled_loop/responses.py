@@ -7,28 +7,25 @@ Implements: theory of the sampled loop, section 3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.sampled_loop.exponential import Exponential
-from tubecert.sampled_loop.midrad import SUMMED, UNIT, Known
-from tubecert.sampled_loop.setting import Controller, Loop, Size
+from tubecert.sampled_loop.midrad import SUMMED, UNIT, Known, lengths, total
+from tubecert.sampled_loop.setting import Controller, Loop
 
 _AT_ONCE: Final = 400_000  # entries of a batch of rows
-_ROOT_TINY: Final = 1e-150
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Flow:
-    """e at a time s of a sample, by the parts of xi: `core` (n, a), `eta` (n, r); of n and r_u directly."""
+class Flow(NamedTuple):
+    """Outputs (R) by the parts of xi, `core` (R, a) and `eta` (R, r), and directly by n (R, n) and r_u (R, m)."""
 
     core: Known
     eta: Known
@@ -36,25 +33,17 @@ class Flow:
     rounding: Known
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Direct:
-    """What acts within a sample up to a node: wind (n,), rho (n, n + m), rates of eta (n, r)."""
+class Counts(NamedTuple):
+    """How much every signal counts in outputs (R), from above: noise and wind as they are, the others by their sizes.
 
+    `core` (R, a) and `eta` (R, r) of xi, `rounding` (R, n + m) of y and u, `rho` (R, n + m), `rate` (R, r) of eta.
+    """
+
+    noise: Array
     wind: Array
-    rho: Array
-    rate: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Piece:
-    """A part of a sample between two nodes, and how far e and its direct terms are from chords (theory, eq. 3.4)."""
-
-    first: int
     core: Array
     eta: Array
-    noise: Array
     rounding: Array
-    wind: Array
     rho: Array
     rate: Array
 
@@ -66,7 +55,7 @@ class Dynamics:
         self.loop, self.controller = loop, controller
         self.exponential = Exponential(loop.A)
         self.n, self.m, self.z, self.q = loop.states, loop.inputs, controller.size, loop.whole
-        self.B, self.H = Known.exact(loop.B), Known.exact(loop.H)
+        self.A, self.B, self.H = Known.exact(loop.A), Known.exact(loop.B), Known.exact(loop.H)
         self.core_size = self.n + self.z + self.m * (self.q + 1)
         self._N, self._M = Known.exact(controller.N), Known.exact(controller.M)
 
@@ -74,73 +63,67 @@ class Dynamics:
         """G0(s), of the newer input, and G1(s), of the older one, each (n, m)."""
         rest = self.loop.rest
         if s <= rest:
-            return Known.exact(np.zeros((self.n, self.m))), self.exponential.at(s)[1] @ self.B
+            return Known.zero(self.n, self.m), self.exponential.at(s)[1] @ self.B
         phi, since = self.exponential.at(s - rest)
         return since @ self.B, phi @ (self.exponential.at(rest)[1] @ self.B)
 
     def flow(self, s: Fraction) -> Flow:
-        """c_s, and the direct terms of the noise and of the rounding of the input."""
+        """c_s: e at a time s of a sample."""
         phi, whole = self.exponential.at(s)
-        newer, older = self.held(s)
-        return self._assembled(phi, newer, older, whole @ self.H)
+        return self._assembled(phi, *self.held(s), whole @ self.H)
 
     def _assembled(self, e: Known, newer: Known, older: Known, eta: Known) -> Flow:
         """A map of xi whose newer input is delta_k (no whole sample of delay) or v_q."""
-        zero = Known.exact(np.zeros((self.n, self.m)))
-        past = [zero] * (self.q + 1)
-        past[self.q] = older
-        if self.q:
-            past[self.q - 1] = newer
-            nothing = Known.exact(np.zeros((self.n, self.z)))
-            core = Known.stacked([[e, nothing, *past]])
-            return Flow(core, eta, Known.exact(np.zeros((self.n, self.n))), zero)
-        core = Known.stacked([[e + newer @ self._N, newer @ self._M, *past]])
-        return Flow(core, eta, newer @ self._N, newer)
+        zero = Known.zero(self.n, self.m)
+        if not self.q:
+            core = Known.stacked([[e + newer @ self._N, newer @ self._M, older]])
+            return Flow(core, eta, newer @ self._N, newer)
+        core = Known.stacked([[e, Known.zero(self.n, self.z), *[zero] * (self.q - 1), newer, older]])
+        return Flow(core, eta, Known.zero(self.n, self.n), zero)
 
     def slope(self, s: Fraction) -> Flow:
         """c_s' = A c_s + B (what acts) + H eta, at a time that is not tau'."""
-        own, A = self.flow(s), Known.exact(self.loop.A)
-        zero = Known.exact(np.zeros((self.n, self.m)))
-        older = s < self.loop.rest
-        nothing = Known.exact(np.zeros((self.n, self.n)))
-        acting = self._assembled(nothing, zero if older else self.B, self.B if older else zero, self.H)
-        return Flow(
-            A @ own.core + acting.core,
-            A @ own.eta + acting.eta,
-            A @ own.noise + acting.noise,
-            A @ own.rounding + acting.rounding,
-        )
+        zero = Known.zero(self.n, self.m)
+        newer, older = (zero, self.B) if s < self.loop.rest else (self.B, zero)
+        acting = self._assembled(Known.zero(self.n, self.n), newer, older, self.H)
+        return Flow(*(self.A @ own + more for own, more in zip(self.flow(s), acting, strict=True)))
 
     def step(self) -> tuple[Known, Known]:
         """AA without eta, (a, a), and its column of eta, (a, r)."""
         flow, c = self.flow(self.loop.sample_time), self.controller
         past = self.m * (self.q + 1)
-        shift = np.zeros((past, past))
-        shift[self.m :, : past - self.m] = np.eye(past - self.m)
-        first = np.zeros((past, self.n + self.z))
-        first[: self.m] = np.hstack([c.N, c.M])
-        lower = np.block([[np.hstack([c.G, c.F]), np.zeros((self.z, past))], [first, shift]])
-        eta = np.zeros((self.core_size - self.n, self.loop.H.shape[1]))
-        return Known.stacked([[flow.core], [Known.exact(lower)]]), Known.stacked(
-            [[flow.eta], [Known.exact(eta)]]
+        lower = np.block(
+            [
+                [c.G, c.F, np.zeros((self.z, past))],
+                [c.N, c.M, np.zeros((self.m, past))],
+                [np.zeros((past - self.m, self.n + self.z)), np.eye(past - self.m, past)],
+            ]
         )
+        still = Known.zero(self.core_size - self.n, self.loop.H.shape[1])
+        return Known.stacked([[flow.core], [Known.exact(lower)]]), Known.stacked([[flow.eta], [still]])
 
     def discrete(self) -> Known:
         """How n, r_u and r_z enter at a sample, (a, n + m + z)."""
         flow, c = self.flow(self.loop.sample_time), self.controller
-        past, z = self.m * (self.q + 1), self.z
-        one = np.zeros((past, self.m))
-        one[: self.m] = np.eye(self.m)
-        first = np.zeros((past, self.n))
-        first[: self.m] = c.N
+        n, m, z = self.n, self.m, self.z
         lower = np.block(
             [
-                [c.G, np.zeros((z, self.m)), np.eye(z)],
-                [first, one, np.zeros((past, z))],
+                [c.G, np.zeros((z, m)), np.eye(z)],
+                [c.N, np.eye(m), np.zeros((m, z))],
+                [np.zeros((m * self.q, n + m + z))],
             ]
         )
-        upper = [flow.noise, flow.rounding, Known.exact(np.zeros((self.n, z)))]
-        return Known.stacked([[Known.stacked([upper])], [Known.exact(lower)]])
+        upper = Known.stacked([[flow.noise, flow.rounding, Known.zero(n, z)]])
+        return Known.stacked([[upper], [Known.exact(lower)]])
+
+    def outputs(self, nodes: Iterable[Fraction]) -> Flow:
+        """The rows of e at every node of a sample, of delta, and of zeta."""
+        n, m, z, a, r = self.n, self.m, self.z, self.core_size, self.loop.H.shape[1]
+        sent = Known.stacked([[self._N, self._M, Known.zero(m, a - n - z)]])
+        delta = Flow(sent, Known.zero(m, r), self._N, Known.exact(np.eye(m)))
+        zeta = Flow(Known.exact(np.eye(z, a, n)), *(Known.zero(z, size) for size in (r, n, m)))
+        parts = zip(*map(self.flow, nodes), delta, zeta, strict=True)
+        return Flow(*(Known.stacked([[own] for own in part]) for part in parts))
 
 
 class Kernel:
@@ -156,15 +139,12 @@ class Kernel:
     ) -> None:
         self.columns = K.shape[1]
         self._at: list[tuple[float, Known]] = []
-        bent = np.zeros_like(K)
+        bent, own, columns = np.zeros_like(K), Known.exact(A), Known.exact(K)
         for a, b in pairwise(ends):
             d = fraction_bounds(b - a)[1]
-            for s in (a, b):
-                phi, whole = exponential.at(s)
-                self._at.append((0.5 * d, (whole if integral else phi) @ Known.exact(K)))
-            phi, _ = exponential.at((a + b) / 2)
-            slope = Known.exact(A) @ (phi @ Known.exact(K))
-            second = slope if integral else Known.exact(A) @ slope
+            self._at += [(0.5 * d, exponential.at(s)[integral] @ columns) for s in (a, b)]
+            slope = own @ (exponential.at((a + b) / 2)[0] @ columns)
+            second = slope if integral else own @ slope
             bent = bent + d**3 / 12 * (swelling(A, (b - a) / 2) @ second.above) * (1 + 1e-12)
         self._bent = bent * SUMMED
 
@@ -179,14 +159,27 @@ class Kernel:
         return np.asarray((parts + np.abs(rows) @ bent * SUMMED) * SUMMED)
 
 
-def lengths(rows: Array) -> Array:
-    """Euclidean lengths of rows of numbers that are not negative, (N, 1), from above."""
-    return np.asarray(np.sqrt(np.sum(rows * rows, axis=-1, keepdims=True)) * SUMMED + _ROOT_TINY)
-
-
 def swelling(A: Array, s: Fraction) -> Array:
     """e^(|A| s), (n, n), from above."""
     return Exponential(np.abs(A)).at(s)[0].above
+
+
+class _Within:
+    """What acts from the beginning of a sample up to a time: wind, rho, eta by its rate, and eta as an input."""
+
+    def __init__(self, dynamics: Dynamics, until: Fraction, panels: int) -> None:
+        loop, own = dynamics.loop, dynamics.exponential
+        parts = max(1, ceil(panels * until / loop.sample_time))
+        ends = [until * k / parts for k in range(parts + 1)]
+        self._winds = [(Kernel(own, loop.A, K, ends, integral=False), size) for K, size in loop.sudden]
+        self._rho, self._size = (Kernel(own, loop.A, K, ends, integral=False) for K in (loop.R, loop.H))
+        self._rate = Kernel(own, loop.A, loop.H, ends, integral=True)
+
+    def of(self, rows: Array, eta: Array | None = None) -> tuple[Array, Array, Array, Array]:
+        """For rows (N, n) of e, and (N, r) of eta: wind (N,), rho (N, n + m), rate (N, r), size (N, r)."""
+        winds = (total(own.of(rows, length=size.length), size.weights) for own, size in self._winds)
+        wind = sum(winds, start=np.zeros(len(rows)))
+        return wind, self._rho.of(rows), self._rate.of(rows, eta), self._size.of(rows)
 
 
 class Responses:
@@ -194,22 +187,36 @@ class Responses:
 
     Sums over lags 0..k-1 stand at index k, k = 0..L: `noise`, `wind` (L + 1, R), `rounding` (L + 1, R, n + m + z),
     `rho` (L + 1, R, n + m), `rate` and `size` (L + 1, R, r). `rows` (L + 1, R, a) and `eta` (L + 1, R, r) are the free
-    rows themselves; `missed_core`, `missed_eta` all that they miss, summed, with the radii of the outputs.
+    rows themselves. `now`: what enters directly, and all that the rows miss, with the radii of the outputs; `direct`:
+    what acts within the sample up to every node; `pieces`: how far e between two of them is from the chord.
     """
 
     def __init__(self, loop: Loop, controller: Controller, *, lags: int, pieces: int, panels: int) -> None:
-        self.loop, self.controller, self.lags = loop, controller, lags
+        self.loop, self.lags, self._panels = loop, lags, panels
         self.dynamics = own = Dynamics(loop, controller)
-        Ts, n = loop.sample_time, loop.states
+        Ts = loop.sample_time
         self.nodes = sorted({*(Ts * k / pieces for k in range(pieces + 1)), loop.rest})
-        self._panels = panels
-        flows = [own.flow(s) for s in self.nodes]
-        self._outputs(flows)
-        self.rows, self.eta = self._free_rows()
-        self._kernels()
-        self.pieces = [self._piece(i) for i in range(len(self.nodes) - 1)]
+        self._first = own.outputs(self.nodes)
+        self.count = self._first.core.rows
+        self.rows, self.eta, missed_core, missed_eta = self._free_rows()
+        noise, rounding = self._first.noise.above, self._first.rounding.above
+        self.now = self._nothing(self.count)._replace(
+            noise=loop.noise.weigh(noise),
+            core=missed_core,
+            eta=missed_eta,
+            rounding=np.hstack([noise, rounding]),
+        )
+        self._discrete, self._within = own.discrete(), _Within(own, Ts, panels)
+        sums = zip(*map(self._entered, self._batches()), strict=True)
+        self.noise, self.wind, self.rounding, self.rho, self.rate, self.size = map(self._cumulated, sums)
         self.direct = [self._direct(s) for s in self.nodes]
-        self.count = n * len(self.nodes) + loop.inputs + controller.size
+        self.pieces = [self._piece(a, b) for a, b in pairwise(self.nodes)]
+
+    def _nothing(self, outputs: int) -> Counts:
+        own, r = self.dynamics, self.loop.H.shape[1]
+        sizes = (own.core_size, r, own.n + own.m, own.n + own.m, r)
+        zero = np.zeros(outputs)
+        return Counts(zero, zero, *(np.zeros((outputs, size)) for size in sizes))
 
     def shorter(self, lags: int) -> Responses:
         """The same over fewer lags; what the free rows miss is still counted over all."""
@@ -219,141 +226,76 @@ class Responses:
             setattr(found, name, getattr(self, name)[: lags + 1])
         return found
 
-    def _outputs(self, flows: Sequence[Flow]) -> None:
-        own, c = self.dynamics, self.controller
-        z, m, a = own.z, own.m, own.core_size
-        r = self.loop.H.shape[1]
-        delta = np.zeros((m, a))
-        delta[:, : own.n + z] = np.hstack([c.N, c.M])
-        unit = np.zeros((z, a))
-        unit[:, own.n : own.n + z] = np.eye(z)
-        nothing = Known.exact(np.zeros((m + z, r)))
-        core = Known.stacked([*([flow.core] for flow in flows), [Known.exact(delta)], [Known.exact(unit)]])
-        eta = Known.stacked([*([flow.eta] for flow in flows), [nothing]])
-        self._first, self._first_eta = core, eta
-        zeros = np.zeros((z, own.n)), np.zeros((z, m))
-        self.noise_now = np.vstack([*(f.noise.above for f in flows), np.abs(c.N), zeros[0]])
-        self.rounding_now = np.vstack([*(f.rounding.above for f in flows), np.eye(m), zeros[1]])
-
-    def _free_rows(self) -> tuple[Array, Array]:
+    def _free_rows(self) -> tuple[Array, Array, Array, Array]:
         """r_0..r_L without eta, (L + 1, R, a), and their entries for eta, (L + 1, R, r); and what they miss."""
-        step, into = self.dynamics.step()
-        rows, power = self._first.mid[None], step.mid
+        (step, into), first = self.dynamics.step(), self._first
+        rows, power = first.core.mid[None], step.mid
         with np.errstate(all="ignore"):  # rows that overflow prove nothing
             while len(rows) <= self.lags:
                 rows = np.concatenate([rows, rows @ power])
                 power = power @ power
         rows = rows[: self.lags + 1]
-        met = rows[:-1] @ into.mid
-        eta = np.cumsum(np.concatenate([self._first_eta.mid[None], met]), axis=0)
-        missed_core, missed_eta = self._first.rad, self._first_eta.rad
-        for part in self._batches(self.lags):
-            before = rows[part].reshape(-1, rows.shape[2])
-            last = slice(part.start + 1, part.stop + 1)
-            missed_core = missed_core + _sum(self._off(before, step, rows[last]))
-            follows = self._off(before, into, eta[last], Known.exact(eta[part].reshape(len(before), -1)))
-            missed_eta = missed_eta + _sum(follows)
-        slack = 1 + 4 * self.lags * UNIT
-        self.missed_core, self.missed_eta = missed_core * slack * SUMMED, missed_eta * slack * SUMMED
-        return rows, eta
+        eta = np.cumsum(np.concatenate([first.eta.mid[None], rows[:-1] @ into.mid]), axis=0)
+        missed_core, missed_eta = first.core.rad, first.eta.rad
+        for part in self._batches():
+            before, last = rows[part].reshape(-1, rows.shape[2]), slice(part.start + 1, part.stop + 1)
+            follows, slow = Known.exact(before) @ step, Known.exact(before) @ into
+            slow = slow + Known.exact(eta[part].reshape(len(before), -1))
+            missed_core = missed_core + _off(follows, rows[last])
+            missed_eta = missed_eta + _off(slow, eta[last])
+        slack = (1 + 4 * self.lags * UNIT) * SUMMED
+        return rows, eta, missed_core * slack, missed_eta * slack
 
-    def _off(self, rows: Array, step: Known, after: Array, plus: Known | None = None) -> Array:
-        """|r_(i-1) AA - r_i|, in the shape of `after`."""
-        exact = Known.exact(rows) @ step
-        whole = exact if plus is None else exact + plus
-        return (whole - Known.exact(after.reshape(whole.mid.shape))).above.reshape(after.shape)
+    def _batches(self) -> list[slice]:
+        size = max(1, _AT_ONCE // max(1, self.count * self.dynamics.core_size))
+        return [slice(start, min(start + size, self.lags)) for start in range(0, self.lags, size)]
 
-    def _batches(self, count: int) -> list[slice]:
-        size = max(1, _AT_ONCE // max(1, self._first.rows * self.dynamics.core_size))
-        return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+    def _entered(self, part: slice) -> tuple[Array, ...]:
+        """What the signals of each lag count."""
+        rows = self.rows[part]
+        flat = rows.reshape(-1, rows.shape[2])
+        e, eta = np.ascontiguousarray(flat[:, : self.loop.states]), self.eta[part].reshape(len(flat), -1)
+        jumps = (Known.exact(flat) @ self._discrete).above
+        noise = self.loop.noise.weigh(jumps[:, : self.loop.states])
+        wind, *slow = self._within.of(e, eta)
+        return tuple(own.reshape(*rows.shape[:2], *own.shape[1:]) for own in (noise, wind, jumps, *slow))
 
-    def _ends(self, until: Fraction) -> list[Fraction]:
-        """Ends of the parts of a quadrature over [0, until]."""
-        parts = max(1, ceil(self._panels * until / self.loop.sample_time))
-        return [until * k / parts for k in range(parts + 1)]
-
-    def _signals(self, until: Fraction) -> tuple[list[tuple[Kernel, Size]], Kernel, Kernel, Kernel]:
-        """Kernels of winds, of rho, of eta' and of eta as an input."""
-        loop, e = self.loop, self.dynamics.exponential
-        ends, R = self._ends(until), np.hstack([np.eye(loop.states), loop.B])
-        winds = [(Kernel(e, loop.A, K, ends, integral=False), size) for K, size in loop.sudden]
-        return (
-            winds,
-            Kernel(e, loop.A, R, ends, integral=False),
-            Kernel(e, loop.A, loop.H, ends, integral=True),
-            Kernel(e, loop.A, loop.H, ends, integral=False),
-        )
-
-    def _kernels(self) -> None:
-        loop, n = self.loop, self.loop.states
-        winds, rho, rate, size = self._signals(loop.sample_time)
-        enters = self.dynamics.discrete()
-        found: list[list[Array]] = [[], [], [], [], [], []]
-        for part in self._batches(self.lags):
-            rows = self.rows[part]
-            shape = rows.shape[:2]
-            flat = rows.reshape(-1, rows.shape[2])
-            e, eta = np.ascontiguousarray(flat[:, :n]), self.eta[part].reshape(len(flat), -1)
-            jumps = (Known.exact(flat) @ enters).above
-            values = (
-                weighed(jumps[:, :n], loop.noise),
-                sum((_blown(kernel, e, own) for kernel, own in winds), start=np.zeros(len(e))),
-                jumps,
-                rho.of(e),
-                rate.of(e, eta),
-                size.of(e),
-            )
-            for own, value in zip(found, values, strict=True):
-                own.append(value.reshape(*shape, *value.shape[1:]))
-        self.noise, self.wind, self.rounding, self.rho, self.rate, self.size = map(self._cumulated, found)
-
-    def _cumulated(self, parts: list[Array]) -> Array:
+    def _cumulated(self, parts: Sequence[Array]) -> Array:
         """Sums over the lags before each, from above: k additions, k u."""
         whole = np.concatenate(parts)
-        before = np.zeros((1, *whole.shape[1:]))
-        sums = np.concatenate([before, np.cumsum(whole, axis=0)])
+        sums = np.concatenate([np.zeros_like(whole[:1]), np.cumsum(whole, axis=0)])
         return np.asarray(sums * (1 + 4 * (self.lags + 4) * UNIT))
 
-    def _direct(self, until: Fraction) -> Direct:
-        n, m, r = self.loop.states, self.loop.inputs, self.loop.H.shape[1]
-        if not until:
-            return Direct(np.zeros(n), np.zeros((n, n + m)), np.zeros((n, r)))
-        winds, rho, rate, _ = self._signals(until)
-        one = np.eye(n)
-        wind = sum((_blown(kernel, one, own) for kernel, own in winds), start=np.zeros(n))
-        return Direct(np.asarray(wind), rho.of(one), rate.of(one))
+    def _direct(self, until: Fraction) -> Counts:
+        n = self.loop.states
+        wind, rho, rate, _ = _Within(self.dynamics, until, self._panels).of(np.eye(n))
+        return self._nothing(n)._replace(wind=wind, rho=rho, rate=rate)
 
-    def _piece(self, first: int) -> Piece:
-        a, b = self.nodes[first], self.nodes[first + 1]
-        slope = self.dynamics.slope((a + b) / 2)
-        d = fraction_bounds(b - a)[1]
-        share = d * d / 8 * (np.abs(self.loop.A) @ swelling(self.loop.A, (b - a) / 2)) * SUMMED
-        parts = (slope.core, slope.eta, slope.noise, slope.rounding)
-        phi, _ = self.dynamics.exponential.at((a + b) / 2)
-        turned = d * d / 8 * swelling(self.loop.A, (b - a) / 2) * SUMMED
-        R = np.hstack([np.eye(self.loop.states), self.loop.B])
-        core, eta, noise, rounding, rho = (
-            share @ own.above * SUMMED for own in (*parts, phi @ Known.exact(R))
+    def _piece(self, a: Fraction, b: Fraction) -> Counts:
+        """How far e is from its chord between two nodes (theory, eq. 3.4)."""
+        loop, own = self.loop, self.dynamics
+        middle, d = (a + b) / 2, fraction_bounds(b - a)[1]
+        turned = d * d / 8 * swelling(loop.A, (b - a) / 2) * SUMMED
+        share = np.abs(loop.A) @ turned * SUMMED
+        core, eta, noise, rounding = (share @ part.above * SUMMED for part in own.slope(middle))
+        phi, _ = own.exponential.at(middle)
+
+        def moved(by: Array, columns: Array) -> Array:
+            return np.asarray(by @ (phi @ Known.exact(columns)).above * SUMMED)
+
+        winds = (size.weigh(moved(share, K)) for K, size in loop.sudden)
+        return Counts(
+            noise=loop.noise.weigh(noise),
+            wind=sum(winds, start=np.zeros(own.n)),
+            core=core,
+            eta=eta,
+            rounding=np.hstack([noise, rounding]),
+            rho=moved(share, loop.R),
+            rate=moved(turned, loop.H),
         )
-        wind = np.zeros(self.loop.states)
-        for K, size in self.loop.sudden:
-            wind += weighed(share @ (phi @ Known.exact(K)).above * SUMMED, size)
-        rate = turned @ (phi @ Known.exact(self.loop.H)).above * SUMMED
-        return Piece(first, core, eta, noise, rounding, wind, rho, rate)
 
 
-def weighed(columns: Array, size: Size) -> Array:
-    """What rows (N, k) of numbers that are not negative do to a signal of a size: (N,), from above."""
-    if size.length:
-        return np.asarray(lengths(columns)[:, 0] * size.each[0] * (1 + 1e-15))
-    return np.asarray(columns @ size.each * SUMMED)
-
-
-def _blown(kernel: Kernel, rows: Array, size: Size) -> Array:
-    found = kernel.of(rows, length=size.length)
-    return np.asarray(found[:, 0] * size.each[0] * (1 + 1e-15) if size.length else found @ size.each * SUMMED)
-
-
-def _sum(values: Array) -> Array:
-    """Over lags."""
-    return np.asarray(np.sum(values, axis=0) * SUMMED)
+def _off(found: Known, after: Array) -> Array:
+    """|r_(i-1) AA - r_i|, summed over the lags of `after`."""
+    missed = (found - Known.exact(after.reshape(found.mid.shape))).above
+    return np.asarray(np.sum(missed.reshape(after.shape), axis=0) * SUMMED)

@@ -22,7 +22,7 @@ from tubecert.enclosure.outward import number_above
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import ZERO, Expression, constant, free_symbols
 from tubecert.model import ControlAffineModel, moving_parts, time_period
-from tubecert.sampled_loop.midrad import Known
+from tubecert.sampled_loop.midrad import Known, lengths, total
 from tubecert.sampled_loop.record import Afterwards, HexMatrix, Hold, PlanKnots, Tables
 from tubecert.spec import Spec
 from tubecert.spec.types import Hardware, Vector
@@ -48,6 +48,15 @@ class Size:
         if isinstance(bound, tuple):
             return cls(np.array([fraction_bounds(each)[1] for each in bound]), length=False)
         return cls(np.full(components, fraction_bounds(bound)[1]), length=components > 1)
+
+    @property
+    def weights(self) -> Array:
+        """Of the components (k,), or of the length alone (1,)."""
+        return self.each[:1] if self.length else self.each
+
+    def weigh(self, columns: Array) -> Array:
+        """What rows (.., k) of numbers that are not negative do to the signal: (..,), from above."""
+        return total(lengths(columns) if self.length else columns, self.weights)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,6 +193,11 @@ class Loop:
         swaying = self.E if self.sways else self.E[:, :0]
         rows = self.unknown if self.slow else ()
         return np.hstack([own, swaying, np.eye(self.states)[:, list(rows)]])
+
+    @property
+    def R(self) -> Array:
+        """How rho enters, (n, n + m): as it is, and by columns of B."""
+        return np.hstack([np.eye(self.states), self.B])
 
     @cached_property
     def sudden(self) -> tuple[tuple[Array, Size], ...]:

@@ -8,11 +8,11 @@ possible (theory of the sampled loop, section 5). Who proposed tables, tube and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +23,13 @@ from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.enclosure.outward import number_above, number_below
 from tubecert.enclosure.processor import require_ieee
 from tubecert.findings import Severity
-from tubecert.model import domain_findings
+from tubecert.model import ControlAffineModel, domain_findings
 from tubecert.sampled_loop.cells import MOST
 from tubecert.sampled_loop.midrad import SUMMED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
 from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders, Sizes
-from tubecert.sampled_loop.responses import Responses, weighed
+from tubecert.sampled_loop.responses import Counts, Responses
 from tubecert.sampled_loop.setting import PLAN_ROUNDING, Controller, Loop
 from tubecert.trajectory.family import Family
 from tubecert.verdict import Verdict
@@ -44,8 +44,7 @@ _DIGITS: Final = 7
 _INDEX = NDArray[np.intp]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Boxes:
+class Boxes(NamedTuple):
     """What is claimed, or what follows, stage by stage: W (g, n) of e, U (g, m) of delta, Z (g, z) of zeta."""
 
     W: Array
@@ -53,75 +52,62 @@ class Boxes:
     Z: Array
 
     @classmethod
-    def of(cls, stages: Sequence[Stage], names: tuple[Sequence[str], Sequence[str]], *, above: bool) -> Boxes:
+    def of(cls, stages: Sequence[Stage], model: ControlAffineModel, *, above: bool) -> Boxes:
         """Of stages, as floats from above or from below."""
-        end = 1 if above else 0
 
-        def floats(values: Sequence[Fraction]) -> list[float]:
-            return [fraction_bounds(value)[end] for value in values]
+        def floats(rows: Sequence[Sequence[Fraction]]) -> Array:
+            return np.array([[fraction_bounds(x)[above] for x in row] for row in rows]).reshape(len(rows), -1)
 
-        states, inputs = names
         return cls(
-            np.array([floats([own.half_widths[name] for name in states]) for own in stages]),
-            np.array([floats([own.deviations[name] for name in inputs]) for own in stages]),
-            np.array([floats(own.memory) for own in stages]).reshape(len(stages), -1),
+            floats([[own.half_widths[name] for name in model.states] for own in stages]),
+            floats([[own.deviations[name] for name in model.inputs] for own in stages]),
+            floats([own.memory for own in stages]),
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Phase:
-    """Samples from `start` on with one stage and the same commands acting: remainders, and the box of xi."""
+class Phase(NamedTuple):
+    """Samples from `start` on with one stage and the same commands acting: sizes of all that `Counts` counts."""
 
     start: int
-    rho: Array
     core: Array
     eta: Array
+    rounding: Array
+    rho: Array
+    rate: Array
+
+    def met(self, counts: Counts) -> Array:
+        """What all signals do to outputs, (..,)."""
+        pairs = zip(counts[2:], self[1:], strict=True)
+        return np.asarray(sum((total(own, size) for own, size in pairs), counts.noise + counts.wind) * SUMMED)
 
 
+@dataclass(frozen=True, eq=False)
 class Inequalities:
-    """All b_o(k) of one loop, controller and recipe, for any tube: it is monotone in the tube."""
+    """All b_o(k) of one loop, controller and recipe, for any tube: it is monotone in the tube.
 
-    def __init__(
-        self,
-        controller: Controller,
-        recipe: Recipe,
-        starts: Sequence[int],
-        responses: Responses,
-        remainders: Remainders,
-    ) -> None:
-        self.loop, self.controller, self.starts = remainders.loop, controller, tuple(starts)
-        self.responses, self.remainders = responses, remainders
-        n, m, z = self.loop.states, self.loop.inputs, controller.size
-        self._outputs = np.concatenate(
-            [np.tile(np.arange(n), len(responses.nodes)), np.arange(n, n + m + z)]
-        )  # which of e, delta, zeta a row is about
-        self._cut(recipe)
+    They are those of a controller and a recipe, for stages that begin at samples `starts`.
+    """
 
-    def again(
-        self, *, starts: Sequence[int] | None = None, cuts: tuple[tuple[int, ...], ...] | None = None
+    controller: Controller
+    recipe: Recipe
+    starts: tuple[int, ...]
+    responses: Responses
+    remainders: Remainders
+
+    @classmethod
+    def made(
+        cls, remainders: Remainders, controller: Controller, recipe: Recipe, starts: Sequence[int] = (0,)
     ) -> Inequalities:
-        """The same with other stages or other cuts; what is common is not computed again."""
-        found = copy(self)
-        found.starts = self.starts if starts is None else tuple(starts)
-        found._by_eta = None
-        if cuts is not None:
-            found._cut(replace(self.recipe, cuts=cuts))
-        return found
-
-    def shorter(self, lags: int) -> Inequalities:
-        """The same with fewer lags."""
-        cuts = tuple(tuple(min(cut, lags) for cut in row) for row in self.recipe.cuts)
-        recipe = replace(self.recipe, lags=lags, cuts=cuts)
-        return Inequalities(
-            self.controller, recipe, self.starts, self.responses.shorter(lags), self.remainders
+        """Those of the loop of `remainders`."""
+        sizes = {"lags": recipe.lags, "pieces": recipe.pieces, "panels": recipe.panels}
+        return cls(
+            controller, recipe, tuple(starts), Responses(remainders.loop, controller, **sizes), remainders
         )
 
-    def _cut(self, recipe: Recipe) -> None:
-        self.recipe = recipe
-        outputs = self.loop.states + self.loop.inputs + self.controller.size
-        cuts = np.array(recipe.cuts, dtype=np.intp).reshape(outputs, -1)
-        self._cuts = cuts[self._outputs]  # (R, r)
-        self._by_eta: tuple[Array, Array, Array] | None = None
+    @property
+    def loop(self) -> Loop:
+        """The loop that they are about."""
+        return self.remainders.loop
 
     @property
     def last(self) -> int:
@@ -131,30 +117,41 @@ class Inequalities:
 
     def of(self, boxes: Boxes) -> Boxes:
         """The bounds that follow where the loop has kept to these boxes so far."""
-        b, direct, spread = self._all(boxes)
-        n, m = self.loop.states, self.loop.inputs
-        nodes = len(self.responses.nodes)
-        e = b[:, : n * nodes].reshape(len(b), nodes, n)
-        between = [
-            np.maximum(e[:, own.first] + direct[:, own.first], e[:, own.first + 1] + direct[:, own.first + 1])
-            + spread[:, place]
-            for place, own in enumerate(self.responses.pieces)
-        ]
-        within = np.max(between, axis=0) * (1 + 4 * UNIT)
+        b, direct, spread = self.terms(boxes)
+        n, m, nodes = self.loop.states, self.loop.inputs, len(self.responses.nodes)
+        e = b[:, : n * nodes].reshape(len(b), nodes, n) + direct
+        within = np.max(np.maximum(e[:, :-1], e[:, 1:]) + spread, axis=1) * (1 + 4 * UNIT)
         rest = b[:, n * nodes :]
         rest[0, m:] = 0.0  # (c) is for k >= 1: zeta is 0 at boot
-        ends = [*self.starts[1:], self.last + 1]
-        most = [
-            [np.max(own[k:end], axis=0, initial=0.0) for k, end in zip(self.starts, ends, strict=True)]
-            for own in (within, rest[:, :m], rest[:, m:])
-        ]
-        return Boxes(*map(np.array, most))
+        spans = list(pairwise([*self.starts, self.last + 1]))
+        parts = (within, rest[:, :m], rest[:, m:])
+        return Boxes(*(np.array([np.max(own[a:b], axis=0, initial=0.0) for a, b in spans]) for own in parts))
 
-    # -- the terms ---------------------------------------------------------------------------------------------------
+    def terms(self, boxes: Boxes) -> tuple[Array, Array, Array]:
+        """b of every row (K, R); direct terms at every node (K, nodes, n); what pieces add (K, pieces, n)."""
+        own = self.responses
+        (phases, sizes), off = self.phases(boxes), self._rounding(boxes)
+        k = np.arange(self.last + 1)
+        lag = np.minimum(k, own.lags)
+        widest = phases[0]._replace(core=np.max([self._begins, *(phase.core for phase in phases)], axis=0))
+        constant = own.noise + own.wind + total(own.rounding, off)
+        b = widest.met(own.now) + constant[lag] + self.slow(sizes) + self.first(k) + self._tail(phases, k)
+        starts = [phase.start for phase in phases]
+        slack = 8 * (own.lags + 8) * UNIT + 4 * (SUMMED - 1)  # a difference of two sums from above
+        for phase, end in zip(phases, [*starts[1:], self.last + 2], strict=True):
+            answers = total(own.rho, phase.rho)
+            newer, older = np.clip(k - phase.start, 0, lag), np.clip(k - end, 0, lag)
+            b += answers[newer] - answers[older] + slack * answers[newer]
+        index = np.searchsorted(starts, k, side="right") - 1
+        direct, spread = (
+            np.array([[phase.met(counts) for counts in each] for phase in phases])[index]
+            for each in (own.direct, own.pieces)
+        )
+        return b * SUMMED, direct, spread
 
-    def phases(self, boxes: Boxes) -> tuple[list[_Phase], Sizes]:
+    def phases(self, boxes: Boxes) -> tuple[list[Phase], Sizes]:
         """The parts of time in which the same stage lasts and commands of the same stages act."""
-        q = self.loop.whole
+        q, rounding = self.loop.whole, self._rounding(boxes)[: self.loop.states + self.loop.inputs]
         starts = sorted({0, *self.starts, *(k + q + 1 for k in self.starts[1:])})
         ends = [*starts[1:], starts[-1] + 1]
         of = np.searchsorted(self.starts, np.arange(starts[-1] + 2), side="right") - 1
@@ -162,17 +159,16 @@ class Inequalities:
         found = []
         for start, end in zip(starts, ends, strict=True):
             acting = boxes.U[of[max(0, start - q - 1)] : of[end - 1] + 1].max(axis=0)
-            stage = int(of[start])
-            rho = self.remainders.rho(boxes.W[stage], acting, sizes.size)
-            core = np.concatenate([boxes.W[stage], boxes.Z[stage], np.tile(acting, q + 1)])
-            found.append(_Phase(start, rho, core, sizes.size))
+            W, Z = boxes.W[of[start]], boxes.Z[of[start]]
+            rho = self.remainders.rho(W, acting, sizes.size)
+            core = np.concatenate([W, Z, np.tile(acting, q + 1)])
+            found.append(Phase(start, core, sizes.size, rounding, rho, sizes.rate))
         return found, sizes
 
     def _rounding(self, boxes: Boxes) -> Array:
         """r_y (n,), r_u (m,), r_z (z,): what the controller's own arithmetic is off by, of every stage (G9)."""
         loop, c, u = self.loop, self.controller, self.loop.unit
-        n, z = loop.states, c.size
-        k = z + n + 3
+        k = c.size + loop.states + 3
         gamma = k * u / (1 - k * u) * (1 + 1e-15)
         W, Z = boxes.W.max(axis=0), boxes.Z.max(axis=0)
         above, noise = self.remainders.states_above, loop.noise.each
@@ -183,87 +179,31 @@ class Inequalities:
         state = gamma * (total(np.abs(c.F), Z) + total(np.abs(c.G), seen)) + _FLUSHED
         return np.concatenate([y, delta, state]) * SUMMED
 
-    def _all(self, boxes: Boxes) -> tuple[Array, Array, Array]:
-        """b of every row (K, R); direct terms at every node (K, nodes, n); what pieces add (K, pieces, n)."""
-        own, loop = self.responses, self.loop
-        phases, sizes = self.phases(boxes)
-        off = self._rounding(boxes)
-        k = np.arange(self.last + 1)
-        lag = np.minimum(k, own.lags)
-        now = weighed(own.noise_now, loop.noise) + total(own.noise_now, off[: loop.states])
-        now += total(own.rounding_now, off[loop.states : loop.states + loop.inputs])
-        most_core = np.max([phase.core for phase in phases], axis=0)
-        now += total(own.missed_core, np.maximum(most_core, self._begins)) + total(own.missed_eta, sizes.size)
-        constant = own.noise + own.wind + total(own.rounding, off)
-        b = now + constant[lag] + self._slow(sizes) + self._first(k) + self._tail(phases, k)
-        starts = [*(phase.start for phase in phases[1:]), self.last + 2]
-        slack = 8 * (own.lags + 8) * UNIT + 4 * (SUMMED - 1)  # a difference of two sums from above
-        for phase, end in zip(phases, starts, strict=True):
-            answers = total(own.rho, phase.rho)
-            newer, older = np.clip(k - phase.start, 0, lag), np.clip(k - end, 0, lag)
-            b += answers[newer] - answers[older] + slack * answers[newer]
-        index = np.searchsorted([phase.start for phase in phases], k, side="right") - 1
-        direct = np.array([self._within(phase, sizes) for phase in phases])[index]
-        spread = np.array([self._between(phase, off, sizes) for phase in phases])[index]
-        return b * SUMMED, direct, spread
-
-    def causes(self, boxes: Boxes, stage: int) -> Array:
-        """What fills every e_i, delta_j, zeta at the worst sample of a stage, (n + m + z, 6): near, for explanations.
-
-        In turn: noise, holding, h and parameters, wind, start, and all else.
-        """
-        own, loop = self.responses, self.loop
-        n, sizes = loop.states, self.phases(boxes)[1]
-        b, direct, spread = self._all(boxes)
-        ends = [*self.starts[1:], self.last + 1]
-        k = np.arange(self.starts[stage], ends[stage])
-        lag = np.minimum(k, own.lags)
-        rows = np.arange(own.count)
-        last = len(own.nodes) - 1
-        held = np.concatenate([np.zeros(n), self.remainders.held])
-        parts = np.stack(
-            [
-                (weighed(own.noise_now, loop.noise) + own.noise[lag]),
-                total(own.rho, held)[lag],
-                self._slow(sizes)[k],
-                own.wind[lag],
-                self._first(np.arange(self.last + 1))[k],
-            ],
-            axis=-1,
-        )
-        within = own.direct[last]
-        node = slice(n * last, n * (last + 1))
-        parts[:, node, 1] += total(within.rho, held)
-        parts[:, node, 2] += total(within.rate, sizes.rate)
-        parts[:, node, 3] += within.wind
-        whole = b[k].copy()
-        whole[:, node] += direct[k, last] + np.max(spread[k], axis=1)
-        chosen = np.r_[node, n * (last + 1) : own.count]
-        worst = np.argmax(whole[:, chosen], axis=0)
-        found, top = parts[worst, rows[chosen]], whole[worst, rows[chosen]]
-        return np.hstack([found, np.maximum(top - found.sum(axis=1), 0.0)[:, None]])
-
     @property
     def _begins(self) -> Array:
         """The box of xi(0) without eta: zeta and what has been sent are 0 at boot."""
-        nothing = np.zeros(self.responses.dynamics.core_size - self.loop.states)
-        return np.concatenate([self.loop.start.reach, nothing])
+        return np.pad(self.loop.start.reach, (0, self.responses.dynamics.core_size - self.loop.states))
 
-    def _slow(self, sizes: Sizes) -> Array:
+    def slow(self, sizes: Sizes) -> Array:
         """eta by its rate up to the cut, and by its size from there on (D-cut), (K, R)."""
-        if self._by_eta is None:
-            self._by_eta = self._cut_apart()
-        rate, first, size = self._by_eta
+        rate, first, size = self._cut_apart
         return total(rate, sizes.rate) + total(first, sizes.first) + total(size, sizes.size)
 
+    @cached_property
     def _cut_apart(self) -> tuple[Array, Array, Array]:
         """What |eta'|, |eta(0)| and |eta| count in every row, (K, R, r) each."""
-        own, k = self.responses, np.arange(self.last + 1)[:, None, None]
+        own, n, cuts = self.responses, self.loop.states, self.recipe.cuts
+        k, (R, r) = np.arange(self.last + 1)[:, None, None], own.eta.shape[1:]
+        about = [
+            *np.tile(np.arange(n), len(own.nodes)),
+            *range(n, len(cuts)),
+        ]  # which of e, delta, zeta a row is
+        cut = np.array(cuts, dtype=np.intp).reshape(len(cuts), r)[about]
         lag = np.minimum(k, own.lags)
-        rows, column = np.arange(own.count)[None, :, None], np.arange(self._cuts.shape[1])[None, None]
-        upto = np.minimum(lag, self._cuts)
+        rows, column = np.arange(R)[None, :, None], np.arange(r)[None, None]
+        upto = np.minimum(lag, cut)
         entry = np.abs(own.eta[upto, rows, column])
-        begins = (k <= self._cuts) & (k <= own.lags)  # the row still holds the entry that meets eta(0)
+        begins = (k <= cut) & (k <= own.lags)  # the row still holds the entry that meets eta(0)
         older, newer = own.size[lag, rows, column], own.size[upto, rows, column]
         slack = 8 * (own.lags + 8) * UNIT  # a difference of two sums from above
         return (
@@ -272,7 +212,7 @@ class Inequalities:
             np.where(begins, 0.0, entry) + (older - newer + slack * older),
         )
 
-    def _first(self, k: _INDEX) -> Array:
+    def first(self, k: _INDEX) -> Array:
         """sup |r_k xi_0| of the start, for k <= L; afterwards nothing."""
         own, start, n = self.responses, self.loop.start, self.loop.states
         early = own.rows[: min(len(k), own.lags + 1), :, :n]
@@ -285,44 +225,12 @@ class Inequalities:
         found[: len(early)] = known * SUMMED
         return found
 
-    def _tail(self, phases: Sequence[_Phase], k: _INDEX) -> Array:
+    def _tail(self, phases: Sequence[Phase], k: _INDEX) -> Array:
         """|r_L| Xi of the sample L before, for k > L; eta stands with its cut."""
         own = self.responses
-        found = np.zeros((len(k), own.count))
-        late = k > own.lags
         boxes = np.array([total(np.abs(own.rows[-1]), phase.core) for phase in phases])
-        index = np.searchsorted([phase.start for phase in phases], k[late] - own.lags, side="right") - 1
-        found[late] = boxes[index]
-        return found
-
-    def _within(self, phase: _Phase, sizes: Sizes) -> Array:
-        """What acts within the sample itself, up to every node, (nodes, n)."""
-        return np.array(
-            [
-                (own.wind + total(own.rho, phase.rho) + total(own.rate, sizes.rate)) * SUMMED
-                for own in self.responses.direct
-            ]
-        )
-
-    def _between(self, phase: _Phase, off: Array, sizes: Sizes) -> Array:
-        """How far e may be from the chord between two nodes, (pieces, n)."""
-        n, m = self.loop.states, self.loop.inputs
-        return np.array(
-            [
-                (
-                    total(own.core, phase.core)
-                    + total(own.eta, phase.eta)
-                    + weighed(own.noise, self.loop.noise)
-                    + total(own.noise, off[:n])
-                    + total(own.rounding, off[n : n + m])
-                    + own.wind
-                    + total(own.rho, phase.rho)
-                    + total(own.rate, sizes.rate)
-                )
-                * SUMMED
-                for own in self.responses.pieces
-            ]
-        )
+        index = np.searchsorted([phase.start for phase in phases], k - own.lags, side="right") - 1
+        return np.where(k[:, None] > own.lags, boxes[index], 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -351,11 +259,8 @@ def check(
         return Checked(verdict=Verdict.UNDECIDED, lacks=(Lack(kind="not_proven"),))
     starts = [own.start for own in stages]
     if inequalities is None:
-        made = Responses(loop, controller, lags=recipe.lags, pieces=recipe.pieces, panels=recipe.panels)
-        inequalities = Inequalities(controller, recipe, starts, made, Remainders(loop, recipe.windows))
-    names = loop.model.states, loop.model.inputs
-    above = Boxes.of(stages, names, above=True)
-    below = Boxes.of(stages, names, above=False)
+        inequalities = Inequalities.made(Remainders(loop, recipe.windows), controller, recipe, starts)
+    above, below = (Boxes.of(stages, loop.model, above=side) for side in (True, False))
     with np.errstate(all="ignore"):  # what is not finite bounds nothing
         found = inequalities.of(above)
     lacks = [*_short(loop, found, below), *undefined(loop), *_domain(loop, inequalities, above)]
