@@ -49,7 +49,9 @@ def certify() -> None:
 
 def command_line(config: Path) -> None:
     """One configuration through the command line."""
-    imports = "import tubecert.pipeline, tubecert.report.console, tubecert.spec, tubecert.certificate"
+    imports = (
+        "import tubecert.pipeline, tubecert.report.certificate_page, tubecert.spec, tubecert.certificate"
+    )
     bare, _ = wall([sys.executable, "-c", imports])
     with tempfile.TemporaryDirectory() as folder:
         target = str(Path(folder) / "certificate.json")

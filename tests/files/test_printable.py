@@ -27,8 +27,8 @@ from tubecert.errors import ExitCode
 from tubecert.findings import Finding, Location, Severity
 from tubecert.printable import blanked, harmless, printable_json, visible
 from tubecert.report import html, markdown
+from tubecert.report.certificate_page import page_of
 from tubecert.report.page import typeset
-from tubecert.report.page_sections import page_of
 from tubecert.report.terminal import Terminal
 
 ROOT = Path(__file__).parents[2]

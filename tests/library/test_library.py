@@ -286,7 +286,7 @@ def test_what_is_not_certified_has_no_gains_to_use():
     assert (result.omega, result.Gamma) == (None, None)
     assert result.reasons[0].message
     assert not [gains for gains in result.gains if gains.decides and gains.certified]
-    assert "not certified" in result._repr_html_()
+    assert "refuted" in result._repr_html_()
 
 
 def test_results_are_frozen():
@@ -480,7 +480,7 @@ def test_texts_are_escaped_in_notebooks(tmp_path):
     assert "&lt;script&gt;" in tc.verify(DATA, metric)._repr_html_()
     shown = tc.verify(DATA, DATA["metric"])._repr_html_()
     assert '<b class="certified">certified</b> <b>given in code</b>: rate' in shown
-    assert "noise or delay" in result._repr_html_()  # what it assumes is not hidden
+    assert "no noise, delay or saturation" in result._repr_html_()  # what it assumes is not hidden
     framed = tc.report(result)._repr_html_()
     assert framed.startswith("<iframe srcdoc=")
     assert framed.count('"') == 6  # nothing ends the attribute

@@ -31,8 +31,8 @@ from tubecert.expression import to_text
 from tubecert.pipeline import Options
 from tubecert.records import from_json
 from tubecert.report import html, markdown
+from tubecert.report.certificate_page import page_of
 from tubecert.report.figures_axes import Axis, _hexagon, number
-from tubecert.report.page_sections import page_of
 from tubecert.spec import load, load_text
 from tubecert.words.assumptions import assumed
 
@@ -144,7 +144,7 @@ def test_the_page_does_not_depend_on_the_process(tmp_path, orbit):
     file = tmp_path / "orbit.json"
     file.write_text(certificate.dump(orbit), encoding="utf-8")
     code = (
-        "import json, sys; from tubecert.report import html; from tubecert.report.page_sections import page_of;"
+        "import json, sys; from tubecert.report import html; from tubecert.report.certificate_page import page_of;"
         "from tubecert.certificate.result import Certificate;"
         "sys.stdout.buffer.write(html.render_page(page_of(Certificate.from_json(json.load(open(sys.argv[1]))))).encode())"
     )
@@ -537,7 +537,7 @@ def run(*arguments):
 def test_certify_writes_pages_beside_the_certificate(folder, proven):
     done = run("certify", "plant.yaml", "--report", "a.html", "--report", "b.md")
     assert done.exit_code == 0, done.output
-    assert "page a.html" in done.output
+    assert "page        a.html" in done.output
     written = json.loads(Path("plant.certificate.json").read_text(encoding="utf-8"))
     assert Path("a.html").read_text(encoding="utf-8") == html.render_page(page_of(told(written)))
     assert Path("b.md").read_text(encoding="utf-8") == markdown.render_page(page_of(told(written)))

@@ -12,12 +12,14 @@ from hypothesis import strategies as st
 from rich.text import Text
 
 from tubecert.certificate import seal
-from tubecert.certificate.result import Certificate, Result
+from tubecert.certificate.result import Certificate
 from tubecert.digits import down, end, exact, in_unit, percent, short, up
 from tubecert.findings import Finding, Location, Severity
 from tubecert.records import to_json
-from tubecert.report import console, findings
+from tubecert.report import findings
+from tubecert.report.certificate_page import page_of
 from tubecert.report.terminal import Terminal
+from tubecert.report.text import headline, screen
 
 RESULTS = (certified, refuted_metric, refuted_gains, undecided)
 ANSI = re.compile(r"\x1b\[[0-9;]*m")
@@ -34,12 +36,12 @@ def terminal(*, width=100, colored=False):
 
 def shown(result, *, verbose=False, **looks):
     read = Certificate.from_json(seal(result, {}))
-    report = console.report(read, target="out/pendulum.certificate.json", verbose=verbose)
-    return terminal(**looks).text(report)
+    files = [("certificate", "out/pendulum.certificate.json")]
+    return terminal(**looks).text(screen(page_of(read), files, verbose=verbose))
 
 
 def line(result):
-    return terminal().text(console.verdict_line(Result.from_json(result))).rstrip("\n")
+    return terminal(width=200).text(headline(page_of(Certificate.from_json(seal(result, {}))))).rstrip("\n")
 
 
 @pytest.mark.parametrize("make", RESULTS)
@@ -51,8 +53,7 @@ def test_plain_text_is_plain(make, verbose, width):
     assert text.isascii()
     for row in text.splitlines():
         assert row == row.rstrip()
-    below_the_verdict = text.splitlines()[1:]
-    assert max(map(len, below_the_verdict)) <= width
+    assert max(map(len, text.splitlines())) <= width
 
 
 @pytest.mark.parametrize("make", RESULTS)
@@ -70,24 +71,31 @@ def test_the_verdict_comes_first_with_its_numbers():
     assert every.count("omega") == 2
 
 
-def test_a_certificate_is_put_in_one_sentence():
-    text = " ".join(shown(certified()).split())
-    assert "the state stays within 0.04124 of the plan for all t >= 0 if it starts at 0, under the" in text
+def test_what_is_claimed_comes_first_then_the_start_the_tube_and_the_gains():
+    text = shown(certified(), width=120)
+    first, *rows = text.splitlines()
+    assert first == "certified pendulum: the state stays in the tube around the plan for all t >= 0"
+    assert rows[0] == "  start       at 0"
+    assert rows[1].startswith("  tube        ")
+    assert rows[1].endswith("; rho = 0.04124 = 0.03124 (rho_r) + 0.01 (rho_a)")
+    assert "  gains       omega = 41.82 rad/s, Gamma = 1.394e7, by certificate A (26)" in rows
+    assert len(rows) < 16
     finite = certified()
     finite["spec"]["effective"]["trajectory"]["horizon"] = "2.5"
-    assert "for 0 <= t <= 2.5 s" in " ".join(shown(finite).split())
-    assert "in the long run |x - x*| <= 0.0123 with B distance" in text
-    assert "in the long run" not in shown(finite)
+    assert "for 0 <= t <= 2.5 s" in shown(finite)
+    decided = shown(certified(decided_by=["distance"]))
+    assert "long run    |x - x*| <= 0.0123" in decided
+    assert "long run" not in shown(finite | {"decided_by": ["distance"]})
 
 
 def test_a_refusal_names_claim_witness_and_remedy():
-    text = shown(refuted_metric())
+    text = shown(refuted_metric(), width=120)
     first, *rest = text.splitlines()
     assert first.startswith("refuted pendulum: metric, C2: ")
     assert "the largest rate that this metric supports is 0.99654" in first
-    assert any(row.strip() == "at angle = 0.1, speed = -0.25" for row in rest)
-    assert any(row.strip().startswith("help: lower metric.rate to 0.99654") for row in rest)
-    assert "stays within" not in text
+    assert any(row.split() == ["at", "angle", "=", "0.1,", "speed", "=", "-0.25"] for row in rest)
+    assert any(" ".join(row.split()).startswith("help lower metric.rate to 0.99654") for row in rest)
+    assert "stays in the tube" not in text
 
 
 def test_failing_gains_refute_no_tube():
@@ -96,18 +104,18 @@ def test_failing_gains_refute_no_tube():
         "refuted pendulum: A (26a): the initial error and the filter's share must fit into rho_r: its margin lies in"
     )
     assert "does not prove that the state leaves the tube" in text
-    assert "stays within" not in text
+    assert "stays in the tube" not in text
 
 
 def test_undecided_is_shown_as_neither():
     text = shown(undecided())
     assert text.startswith("undecided pendulum: ")
     assert "neither proven nor refuted" in text
-    assert "stays within" not in text
+    assert "stays in the tube" not in text
 
 
 def test_gains_of_different_certificates_do_not_mix():
-    table = shown(certified()).split("Gains\n")[1].split("\n\n")[0].splitlines()
+    table = shown(certified(), verbose=True).split("\nGains\n")[1].split("\n\n")[0].splitlines()
     rows = [row for row in table if "41.82" in row]
     assert len(rows) == 1
     assert "1.394e7" in rows[0]
@@ -133,13 +141,12 @@ def test_verbose_shows_constants_and_assumptions():
 
 def test_what_is_declared_is_said_to_be_believed():
     text = shown(certified(declared={"h": 0.1, "h_t": 0.2}))
-    assert "declared, believed as given: h <= 0.1, h_t <= 0.2" in text
+    assert "declared    h <= 0.1, h_t <= 0.2: believed as given" in text
 
 
 def test_the_report_says_where_the_certificate_is():
-    text = shown(certified())
-    assert "certificate out/pendulum.certificate.json" in text
-    assert seal(certified(), {})["hash"] in text
+    assert "certificate out/pendulum.certificate.json" in shown(certified())
+    assert seal(certified(), {})["hash"] in shown(certified(), verbose=True)
 
 
 def test_an_unbounded_constant_is_shown_as_unknown():
@@ -253,7 +260,7 @@ def test_half_widths_narrower_than_asked_for_are_told_with_what_limits_the_tube(
     asked = result["spec"]["effective"]["tube"] = {"half_widths": {first: "0.5"}}
     result["tube"]["half_widths"] = {first: 0.2, second: 0.97 * min(-low, high)}
     told = " ".join(shown(result).split())
-    assert f"asked for: at most {first} 0.5" in told
+    assert f"wish at most {first} 0.5" in told
     assert f"; {second} limits the tube: it goes nearly to the edge of the safe set" in told
     result["tube"]["half_widths"][second] = 0.5 * min(-low, high)
     assert "limits the tube" not in shown(result)
@@ -261,4 +268,4 @@ def test_half_widths_narrower_than_asked_for_are_told_with_what_limits_the_tube(
     told = " ".join(shown(result).split())
     assert f"; {second} limits the tube, with the half-width that is asked for" in told
     result["tube"]["half_widths"][first] = 0.499
-    assert "asked for:" not in shown(result)
+    assert "wish" not in shown(result)

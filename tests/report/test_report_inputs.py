@@ -8,9 +8,9 @@ from rich.console import Console
 
 from tubecert.certificate.result import Certificate
 from tubecert.checking.expectations import compared, outcome
-from tubecert.report import console
+from tubecert.report.certificate_page import page_of
 from tubecert.report.markdown import render_page
-from tubecert.report.page_sections import page_of
+from tubecert.report.text import screen
 from tubecert.spec import load_text
 
 ONE = """
@@ -32,7 +32,7 @@ def certificate_of(text, **options):
 def told(text, **options):
     out = StringIO()
     made = certificate_of(text, **options)
-    Console(file=out, width=400).print(*console.report(made, target="x.json", verbose=False))
+    Console(file=out, width=400).print(*screen(page_of(made), [], verbose=False))
     return out.getvalue()
 
 
@@ -45,7 +45,7 @@ def test_the_report_says_where_an_input_stays_and_what_takes_it_there():
 
 @pytest.mark.slow
 def test_without_limits_it_has_no_such_section():
-    assert "Inputs" not in told(ONE)
+    assert "input u" not in told(ONE)
 
 
 @pytest.mark.slow
@@ -68,7 +68,7 @@ def test_a_plan_beyond_its_limits_is_told_as_such():
 @pytest.mark.slow
 def test_an_input_that_may_go_too_far_is_told_with_what_takes_it_there():
     shown = told(ONE + "limits: {u: [-1, 0.25]}\n")
-    assert "undecided limits of u: it may reach 0.3" in shown
+    assert "undecided one: limits of u: it may reach 0.3" in shown
     assert "above 0.25: u* reaches 0.2, to which feedback may add 0 and adaptation 0.1" in shown
     assert "u is proven to stay within" in shown
 

@@ -7,8 +7,8 @@ from proven import proven
 
 from tubecert.certificate.result import Certificate
 from tubecert.digits import exact
+from tubecert.report.certificate_page import beyond_its_theorem, less_by_distance
 from tubecert.report.gains import rows
-from tubecert.report.sections import beyond_its_theorem, less_by_distance
 from tubecert.report.shares import filled
 
 WINDY = """
@@ -47,9 +47,10 @@ def test_the_causes_make_up_what_the_margin_leaves_each_as_by_hand():
 @pytest.mark.slow
 def test_a_certificate_that_is_not_stated_for_wind_says_so():
     windy = Certificate.from_json(proven(WINDY)).result
-    [line] = beyond_its_theorem(windy)
+    [(label, line)] = beyond_its_theorem(windy)
+    assert label == "undecided"
     assert line.startswith(
-        "A (26) is undecided: the theorem is stated for inputs and matched uncertainty alone"
+        "certificate A (26): the theorem is stated for inputs and matched uncertainty alone"
     )
     calm = replace(windy, claim=replace(windy.claim, wind=None))
     assert not list(beyond_its_theorem(calm))
@@ -59,9 +60,9 @@ def test_a_certificate_that_is_not_stated_for_wind_says_so():
 def test_where_a_decides_unasked_it_is_said_what_b_asks_for():
     calm = WINDY.replace("disturbance: {E: [[1]], bound: 0.05}\n", "")
     unasked = Certificate.from_json(proven(calm.replace("conditions: {decides: B}\n", ""))).result
-    [line] = less_by_distance(unasked)
+    [(label, line)] = less_by_distance(unasked)
+    assert label == "or"
     least = min(row.pair.adaptation_rate for row in rows(unasked) if row.section == "distance")
-    assert line.startswith("The specification does not say what decides: A does.")
-    assert f"Gamma = {exact(least)}: conditions: {{decides: B}}" in line
+    assert line.endswith(f"Gamma = {exact(least)}, by B distance: --conditions B")
     assert not list(less_by_distance(Certificate.from_json(proven(calm)).result))
     assert not list(less_by_distance(replace(unasked, decided_by=("distance",))))

@@ -12,8 +12,7 @@ from tubecert.certificate.result import Result
 from tubecert.certificate.searched import SolverData
 from tubecert.cli.app import app
 from tubecert.enclosure.constant import Constant
-from tubecert.report import claimed, console, page_sections, synthesis
-from tubecert.report.reach import tube_lines
+from tubecert.report import certificate_page, claimed, synthesis
 
 PLANT = """
 tubecert: 1
@@ -55,8 +54,10 @@ def test_screen_and_page_say_where_the_state_starts(name):
     start, words = STARTS[name]
     result = about(start)
     assert claimed.start_words(result) == words
-    assert f"for all t >= 0 if it starts {words}, under" in console.meaning(result).plain
-    assert ("starts", words) in [(key, cell.text) for key, cell in page_sections._radii(result, result.tube)]
+    assert f"for all t >= 0 if it starts {words}, under" in certificate_page._meaning(result)
+    assert ("starts", words) in [
+        (key, cell.text) for key, cell in certificate_page._radii(result, result.tube)
+    ]
 
 
 def test_of_a_family_the_start_is_that_of_its_plan():
@@ -64,15 +65,6 @@ def test_of_a_family_the_start_is_that_of_its_plan():
     data = result.to_json()
     data["claim"]["plans"] = PLANS
     assert claimed.start_words(Result.from_json(data)) == "within 0.05 of the start of its plan"
-
-
-@pytest.mark.parametrize(("verdict", "told"), [("certified", 0), ("undecided", 1)])
-def test_it_is_said_once(verdict, told):
-    """In the sentence where there is one, else with the tube."""
-    result = about({"at": ["0", "0"]}, verdict=verdict)
-    lines = [str(line) for line in tube_lines(result, result.tube)]
-    assert lines.count("for a state that starts at 0") == told
-    assert ("if it starts" in console.meaning(result).plain) is not bool(told)
 
 
 def said_of(*entries):

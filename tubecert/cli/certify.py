@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
     from tubecert.pipeline.synthesised import Synthesised
+    from tubecert.report.page import Page
     from tubecert.spec import Spec
 
 _OF_SEARCH: Final = Fraction(1, 2)  # of the time that is given: the certification has the rest
@@ -93,7 +94,10 @@ def run(given: Given, output: Output) -> ExitCode:
         certificate.write_text(target, found.text)
     metric = _kept_metric(found.result, kept)
     write_pages(pages, found.certificate)
-    _report(found, target, metric, pages, output)
+    from tubecert.report.certificate_page import page_of
+
+    written = [("metric", metric)] if metric else []
+    _show(found, page_of(found.certificate), [*written, *_closing(found, system, (target, pages))], output)
     return found.verdict.exit_code
 
 
@@ -103,7 +107,6 @@ def _sampled(given: Given, system: Spec, files: tuple[str, Sequence[str]], outpu
     words |= {"deadline": None, "jobs": None if given.jobs == "1" else given.jobs}
     require_nothing_of_a_metric({**given.numbers, **words}, flag)
     from tubecert.library import sampled
-    from tubecert.report import text
     from tubecert.report.sampled_loop import page_of
 
     target, pages = files
@@ -112,26 +115,29 @@ def _sampled(given: Given, system: Spec, files: tuple[str, Sequence[str]], outpu
     if target != certificate.STDOUT:
         certificate.write_text(target, found.text)
     write_pages(pages, found.certificate)
-    page, closing = page_of(found.certificate), _closing(found, target, pages)
-    data = found.text if _is_data(target, output) else None
-    present(output, text.headline(page), lambda: text.screen(page, closing, verbose=output.verbose), data)
+    after = [] if system.controller == "none" else ["export"]
+    _show(found, page_of(found.certificate), _closing(found, system, files, after), output)
     return found.verdict.exit_code
 
 
-def _closing(found: SampledCertification, target: str, pages: Sequence[str]) -> list[tuple[str, str]]:
+def _closing(
+    found: Certification | SampledCertification,
+    spec: Spec,
+    files: tuple[str, Sequence[str]],
+    after: Sequence[str] = (),
+) -> Iterator[tuple[str, str]]:
     """What was written, and the commands that come next."""
-    spec, name = found.specification.spec, shlex.quote(target)
-    after = [
-        ("next", f"tubecert recheck {name}"),
-        ("", f"tubecert simulate {shlex.quote(spec.path)} --certificate {name}"),
-        ("", f"tubecert export {name} -o {shlex.quote(spec.name)}.controller"),
-    ][: 2 if spec.controller == "none" else 3]
-    more = [("more", f"-v here; tubecert report {name}: a page with figures")]
-    return [
-        ("certificate", target),
-        *(("page", page) for page in pages),
-        *(after if found.certified else more),
-    ]
+    target, pages = files
+    name = shlex.quote(target)
+    yield "certificate", target
+    yield from (("page", page) for page in pages)
+    if found.certified:
+        yield "next", f"tubecert recheck {name}"
+        yield "", f"tubecert simulate {shlex.quote(spec.path)} --certificate {name}"
+    if found.certified and after:
+        yield "", f"tubecert export {name} -o {shlex.quote(spec.name)}.controller"
+    if not (found.certified and after):
+        yield "more", f"-v here; tubecert report {name}: a page with figures"
 
 
 def _command() -> str:
@@ -145,11 +151,6 @@ def _will(found: Synthesised, target: str | None) -> keeper.Will | None:
     telling.found(f"metric proven, rate {exact(found.file.rate)} 1/s: kept in {target}")
     text = certificate.dump(found.file.to_json())
     return {"files": {target: text}, "said": "", "code": ExitCode.UNDECIDED.value}
-
-
-def _is_data(target: str, output: Output) -> bool:
-    """Whether the certificate goes to stdout."""
-    return output.json or target == certificate.STDOUT
 
 
 def _target(given: Given) -> str:
@@ -217,17 +218,13 @@ def _kept_metric(result: Result, target: str | None) -> str | None:
     return target
 
 
-def _report(
-    found: Certification, target: str, metric: str | None, pages: Sequence[str], output: Output
+def _show(
+    found: Certification | SampledCertification, page: Page, files: Iterable[tuple[str, str]], output: Output
 ) -> None:
-    """The report on stdout, or the certificate, with the verdict line on stderr."""
-    from tubecert.report import console
+    """The page on stdout, with `files` by what they are; or the certificate, with the verdict line on stderr."""
+    from tubecert.report import text
 
-    present(
-        output,
-        console.verdict_line(found.result),
-        lambda: console.report(
-            found.certificate, target=target, verbose=output.verbose, metric=metric, pages=pages
-        ),
-        found.text if _is_data(target, output) else None,
-    )
+    closing = list(files)
+    target = dict(closing)["certificate"]
+    data = found.text if output.json or target == certificate.STDOUT else None
+    present(output, text.headline(page), lambda: text.screen(page, closing, verbose=output.verbose), data)

@@ -88,7 +88,7 @@ class Certification(Stated):
     @property
     def reasons(self) -> tuple[Reason, ...]:
         """Why the verdict is what it is, in words: `claim`, `message`, `at` and `relax` (what would help)."""
-        from tubecert.report.page_sections import reasons
+        from tubecert.report.certificate_page import reasons
 
         return reasons(self.result)
 
@@ -193,14 +193,16 @@ class Certification(Stated):
         return figures.tradeoff(self.result, ax)
 
     def __str__(self) -> str:
-        from tubecert.report import console
+        from tubecert.report.certificate_page import page_of
+        from tubecert.report.text import headline
 
-        return console.verdict_line(self.result).plain
+        return headline(page_of(self.certificate)).plain
 
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
+        from tubecert.report.certificate_page import page_of
 
-        return notebook.certificate(self.certificate)
+        return notebook.of_page(page_of(self.certificate))
 
     def _proven(self) -> Gains | None:
         return self.deciding if self.certified else None

@@ -74,9 +74,9 @@ class Report:
             from tubecert.report.sampled_loop import page_of
 
             return page_of(self.certificate, self.simulated)
-        from tubecert.report import page_sections
+        from tubecert.report import certificate_page
 
-        return page_sections.page_of(self.certificate, self.simulated)
+        return certificate_page.page_of(self.certificate, self.simulated)
 
 
 def report(result: Certification | SampledCertification | File, *, simulation: File | None = None) -> Report:

@@ -36,7 +36,7 @@ def _lines(page: Page) -> Iterator[str]:
     yield ""
     yield f"**{escape(page.summary)}**"
     yield ""
-    yield escape(page.meaning)
+    yield escape(f"{page.meaning} {page.caveat}".rstrip())
     for section in page.sections:
         yield from _section(section)
 

@@ -1,7 +1,7 @@
 """A page as data: sections of blocks, with nothing of HTML or Markdown in it.
 
-`page_sections` fills it from a certificate; `html` and `markdown` show it. Every text is plain text: who shows it
-escapes it.
+`certificate_page` and `sampled_loop` fill it from a certificate; `text`, `html`, `markdown`, `notebook` show it.
+Every text is plain text: who shows it escapes it.
 """
 
 from __future__ import annotations
@@ -142,7 +142,11 @@ class Tile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
-    """The whole page: the verdict, what it means, the numbers it is about, and everything one may ask next."""
+    """The whole page: the verdict, what it means, the numbers it is about, and everything one may ask next.
+
+    A screen shows the first section, led by the `claim`, or by the `summary` where there is none. `caveat` is what a
+    reader must know who has the page and not the certificate.
+    """
 
     name: str
     verdict: str  # empty where the page is about several
@@ -151,6 +155,8 @@ class Page:
     tiles: tuple[Tile, ...]
     sections: tuple[Section, ...]
     about: str = "certificate"
+    claim: str = ""
+    caveat: str = ""
 
 
 def typeset(text: str) -> str:

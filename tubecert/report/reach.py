@@ -4,53 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING
-
-from rich.text import Text
 
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, near, percent, short, up
-from tubecert.report.claimed import horizon, radius, start_words
+from tubecert.report.claimed import horizon, radius
 from tubecert.report.gains import NAMES
 from tubecert.trajectory.hermite import ends_of_pieces
 from tubecert.verdict import Verdict
-from tubecert.words.sampled_loop import family
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
 
 _NOTABLE = 0.01  # of the range of the knots
 _NARROWER = 0.97  # of what was asked for
 _AT_THE_EDGE = 0.9  # of the room in the safe set
-
-
-def tube_lines(result: Result, tube: TubeData) -> list[RenderableType]:
-    """Radius and shape of the tube, where it lies, and what is near it."""
-    lines = [f"rho = {radii(tube)}; epsilon = {short(tube.epsilon)}"]
-    if tube.coordinates is None and len(result.spec.effective.system.states) > 1:
-        lines[0] += " (Euclidean norm over all states)"
-    if result.claim.plans is not None:
-        lines.append(f"around every plan with {family(result.spec.effective)}")
-    if result.verdict is not Verdict.CERTIFIED:  # else it stands in the sentence above
-        lines.append(f"for a state that starts {start_words(result)}")
-    if tube.half_widths:
-        lines.append(f"half-widths: {half_widths(result, tube.half_widths)}")
-        lines += asked_for(result, tube.half_widths)
-    if tube.coordinates is not None:
-        lines[0] += " (lengths in the coordinates of the tube)"
-        lines.append(in_states(result, tube, tube.epsilon, "epsilon"))
-    own = result.spec.effective.tube.rho_a
-    asked = own if result.overrides.rho_a is None else result.overrides.rho_a
-    if asked is not None and tube.rho_r is not None and tube.rho_a < asked:
-        name = "tube.rho_a" if result.overrides.rho_a is None else "--rho-a"
-        lines.append(
-            f"{name} {short(asked)} is more than the start leaves of these half-widths: half of that is taken"
-        )
-    lines += [*excursion(result), *clearances(result)]
-    found = (f"in the long run {rest} with {title}" for title, rest in long_run(result))
-    return [*map(Text, lines), *map(Text, found)]
 
 
 def asked_for(result: Result, found: Mapping[str, float]) -> Iterator[str]:
@@ -63,7 +28,7 @@ def asked_for(result: Result, found: Mapping[str, float]) -> Iterator[str]:
     why = f"; {attained[0]} limits the tube, with the half-width that is asked for" if attained else ""
     if not attained and (stopped := _stopped(result, found)) is not None:
         why = f"; {stopped} limits the tube: it goes nearly to the edge of the safe set"
-    yield f"asked for: at most {half_widths(result, narrower)}{why}"
+    yield f"at most {half_widths(result, narrower)}{why}"
 
 
 def _stopped(result: Result, found: Mapping[str, float]) -> str | None:
@@ -178,11 +143,11 @@ def radii(tube: TubeData) -> str:
     return f"{up(tube.rho)}{parts}"
 
 
-def half_widths(result: Result, widths: Mapping[str, float]) -> str:
-    """The half-width of every state and output."""
+def half_widths(result: Result, widths: Mapping[str, float], sign: str = "") -> str:
+    """The half-width of every state and output, after a `sign`."""
     units = result.spec.effective.system.units
     return ", ".join(
-        f"{name} {up(widths[name])} {units.get(name, '')}".rstrip()
+        f"{name} {sign}{up(widths[name])} {units.get(name, '')}".rstrip()
         for name in result.spec.effective.system.lengths
         if name in widths
     )

@@ -66,7 +66,8 @@ def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Pag
         name=own.name,
         verdict=result.verdict,
         summary=promise(result),
-        meaning=f"{_meaning(result)} {NOT_RECHECKED}",
+        meaning=_meaning(result),
+        caveat=NOT_RECHECKED,
         tiles=tuple(
             Tile(
                 symbol=name, value=f"±{size(width)}", unit=own.system.units.get(name, ""), words="half-width"

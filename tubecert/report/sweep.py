@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Final
 from rich.text import Text
 
 from tubecert.digits import exact, up
-from tubecert.report.console import STYLES
 from tubecert.report.gains import deciding
-from tubecert.report.layout import plain_table
+from tubecert.report.layout import VERDICTS, plain_table
 from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sweep.grid import Axis
@@ -176,10 +175,10 @@ def summary(table: SweepTable) -> Text:
     """How many points came to what, on one line."""
     line = Text()
     line.append(f"{table.name}: {len(table.rows)} points", style="bold")
-    counts = [(verdict, table.count(str(verdict))) for verdict in STYLES]
+    counts = [(verdict, table.count(str(verdict))) for verdict in VERDICTS]
     for verdict, count in counts:
         if count:
-            line.append(f", {count} ").append(str(verdict), style=STYLES[verdict])
+            line.append(f", {count} ").append(str(verdict), style=f"bold {VERDICTS[verdict]}")
     errors = table.count(ERROR)
     if errors:
         line.append(f", {errors} ").append("invalid or broken", style="bold red")

@@ -27,8 +27,8 @@ def page_of_sweep(table: SweepTable) -> Page:
         meaning=f"Each point is a certification of its own. The keys that were changed: {keys}.",
         tiles=(),
         sections=(
-            Section(key="figures", title="Figures", blocks=drawn),
             Section(key="points", title="Points", blocks=tuple(_points(table))),
+            Section(key="figures", title="Figures", blocks=drawn),
         ),
         about="sweep",
     )

@@ -1,19 +1,25 @@
-"""A certificate as a page: which sections there are, and what each one says.
+"""A certificate as a page: what a screen shows first, then which sections there are, and what each one says.
 
-In: the certificate as data. Out: a `Page`. Numbers are shown as in the console's report: bounds from above rounded up,
-bounds from below rounded down.
+In: the certificate as data. Out: a `Page`, which terminals, HTML, Markdown and notebooks show. Bounds from above are
+rounded up, bounds from below down.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 
 from tubecert.bounds.meanings import EVERY, meaning
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
+from tubecert.claims import family as claims
+from tubecert.claims.gains import GainsSuffice
+from tubecert.claims.limits import InputWithinLimits
 from tubecert.digits import UNKNOWN, down, end, exact, short, up
+from tubecert.kinds import ALONE, DISTANCE, RATES
+from tubecert.kinds.alone import AloneData
 from tubecert.records import to_json
-from tubecert.report import claimed, console, reach, sections
+from tubecert.report import claimed, reach
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_time import input_figures, state_figures
 from tubecert.report.figures_tube import places, suprema_figures, tube_figures
@@ -42,7 +48,9 @@ from tubecert.report.shares import filled
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
-from tubecert.words.claims import message, title
+from tubecert.words.claims import message, sentence, title
+from tubecert.words.conditions import SAYS, equation
+from tubecert.words.sampled_loop import family
 
 _ELLIPSE = (
     "The tube in each plane: the projection of the states whose Riemannian distance to the plan stays below the proven "
@@ -66,15 +74,56 @@ _NO_LIMITS = (
 def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Page:
     """The page of a certificate, whatever its verdict; the same before it is written and after it is read back."""
     result = certificate.result
-    line = console.verdict_line(result).plain
+    holds = result.verdict is Verdict.CERTIFIED
     return Page(
-        name=console.name(result),
+        name=result.spec.effective.name,
         verdict=result.verdict,
-        summary=line.partition(": ")[2],
-        meaning=f"{console.meaning(result).plain} {claimed.NOT_RECHECKED}",
+        summary=_numbers(result) if holds else _because(result),
+        claim=_claim(result) if holds else "",
+        meaning=_meaning(result),
+        caveat=claimed.NOT_RECHECKED,
         tiles=tuple(_tiles(result)),
         sections=tuple(_sections(certificate, simulated)),
     )
+
+
+def _claim(result: Result) -> str:
+    return f"the state stays in the tube around {claimed.plan_words(result)} {claimed.span(result)}"
+
+
+def _numbers(result: Result) -> str:
+    """The radius and the gains of a certified verdict."""
+    chosen, extent = deciding(result), reach.extent(result)
+    numbers = [f"rho = {extent}" if reach.is_radius(result) else extent]
+    return "; ".join([*numbers, *(gains.text(titled=len(chosen) > 1) for gains in chosen)])
+
+
+def _because(result: Result) -> str:
+    """The reason that decided: the first with the verdict's own word."""
+    return "" if result.reason is None else sentence(result.reason)
+
+
+def _meaning(result: Result) -> str:
+    """What the verdict says, and what it does not say."""
+    match result.verdict:
+        case Verdict.CERTIFIED:
+            loops = "; or ".join(gains.words() for gains in deciding(result))
+            return (
+                f"With this metric, {loops}, the state stays within {reach.extent(result)} of "
+                f"{claimed.plan_words(result)} {claimed.span(result)} if it starts {claimed.start_words(result)}, "
+                "under the assumptions below."
+            )
+        case Verdict.REFUTED if result.reason and isinstance(result.reason.claim, InputWithinLimits):
+            return "The plan itself asks more of an input than its limits allow, whatever the gains."
+        case Verdict.REFUTED if result.tube is not None and result.tube.rho_r is not None:
+            return (
+                "The condition below is proven not to hold. It is a sufficient one: that it fails does not prove that "
+                "the state leaves the tube."
+            )
+        case Verdict.REFUTED:
+            return "The claim below is proven false, so nothing that rests on it is certified."
+        case _:
+            return "This is neither proven nor refuted; it must not be relied on."
 
 
 def _tiles(result: Result) -> Iterator[Tile]:
@@ -108,8 +157,9 @@ def _sizes(result: Result) -> Iterator[Tile]:
 
 def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator[Section]:
     result = certificate.result
-    if reasons := _reasons(result, certified=False):
-        yield Section(key="why", title="Not certified", blocks=reasons)
+    brief = Facts(facts=tuple((name, Cell(text=told)) for name, told in _brief(result)))
+    beside = [reason for reason in result.failed if reason is not result.reason]
+    yield Section(key="brief", title="In brief", blocks=(brief, *reasons(result, beside)))
     if result.sections:
         yield Section(key="gains", title="Gains", blocks=tuple(_gains(result)))
     if blocks := tuple(_filled(result)):
@@ -137,8 +187,8 @@ def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator
     yield Section(key="check", title="Check it again", blocks=tuple(again))
 
 
-def reasons(result: Result) -> tuple[Reason, ...]:
-    """Why the verdict is what it is, in words."""
+def reasons(result: Result, some: Sequence[claims.Reason] | None = None) -> tuple[Reason, ...]:
+    """Why the verdict is what it is, in words; or what only `some` of the reasons say."""
     return tuple(
         Reason(
             verdict=reason.verdict,
@@ -147,21 +197,123 @@ def reasons(result: Result) -> tuple[Reason, ...]:
             at="" if reason.at is None else claimed.point(result, reason.at),
             relax=advice(reason.relax, result.spec.effective.uncertainty.h),
         )
-        for reason in result.reasons
+        for reason in (result.reasons if some is None else some)
     )
 
 
-def not_certified(result: Result) -> tuple[tuple[Cell, Cell], ...]:
-    """What is not certified: the claim, and why with what would help."""
-    return tuple(
-        (Cell(text=item.claim), Cell(text=item.message, note=f"help: {item.relax}" if item.relax else ""))
-        for item in reasons(result)
-        if item.verdict != Verdict.CERTIFIED
+# -- in brief
+
+
+def _brief(result: Result) -> Iterator[tuple[str, str]]:
+    """What is seen first, a line each where there is room."""
+    if result.reason is not None and result.reason.verdict is not Verdict.CERTIFIED:
+        [why] = reasons(result, [result.reason])  # what it says stands in the first line
+        yield from ((name, told) for name, told in (("at", why.at), ("help", why.relax)) if told)
+    if result.claim.plans is not None:
+        yield "plans", family(result.spec.effective)
+    yield "start", claimed.start_words(result)
+    if result.tube is not None:
+        yield from _brief_tube(result, result.tube)
+    for row in deciding(result):
+        yield "gains", f"{row.text()}, by certificate {NAMES[row.section]}"
+    yield from less_by_distance(result)
+    yield from beyond_its_theorem(result)
+    for reason in result.reasons:
+        if reason.verdict is Verdict.CERTIFIED:
+            yield from _limits(reason)
+    for own in result.inputs:
+        yield from ((f"input {own.input}", told) for told in reach.input_lines(result, own))
+    yield from (("clearance", told) for told in reach.clearances(result))
+    yield from without_adaptation(result)
+    if result.declared:
+        yield (
+            "declared",
+            f"{', '.join(f'{k} <= {exact(v)}' for k, v in result.declared.items())}: believed as given",
+        )
+    every = len(result.assumptions)
+    yield (
+        "assumed",
+        f"exact continuous-time control, full state, no noise, delay or saturation; {every} in all",
     )
 
 
-def _reasons(result: Result, *, certified: bool) -> tuple[Block, ...]:
-    return tuple(reason for reason in reasons(result) if (reason.verdict == Verdict.CERTIFIED) is certified)
+def _brief_tube(result: Result, tube: TubeData) -> Iterator[tuple[str, str]]:
+    radii = f"rho = {reach.radii(tube)}"
+    if tube.half_widths is None:
+        yield "tube", radii
+    else:
+        known = reach.half_widths(result, tube.half_widths, sign="+-")
+        yield "tube", f"{known}; {radii}" if tube.coordinates is None else known
+        yield from (("wish", told) for told in reach.asked_for(result, tube.half_widths))
+    own = result.spec.effective.tube.rho_a
+    asked = own if result.overrides.rho_a is None else result.overrides.rho_a
+    if asked is not None and tube.rho_r is not None and tube.rho_a < asked:
+        name = "tube.rho_a" if result.overrides.rho_a is None else "--rho-a"
+        yield (
+            "rho_a",
+            f"{name} {short(asked)} is more than the start leaves of this tube: half of that is taken",
+        )
+    yield from (("plan", told) for told in reach.excursion(result))
+    chosen = [NAMES[key] for key in result.decided_by]
+    yield from (("long run", rest) for words, rest in reach.long_run(result) if words in chosen)
+
+
+def _limits(reason: claims.Reason) -> Iterator[tuple[str, str]]:
+    """What sets certified gains, and what would lower them most."""
+    if isinstance(reason.claim, GainsSuffice) and reason.claim.binds is not None:
+        yield "limit", f"{equation(reason.claim.binds)} sets the bandwidth"
+    if reason.relax:
+        yield "help", advice(reason.relax[:1])
+
+
+def less_by_distance(result: Result) -> Iterator[tuple[str, str]]:
+    """That A decides unasked, though B is certified with smaller gains: which, and the key."""
+    if result.spec.effective.says_what_decides or result.decided_by != (RATES.key,):
+        return
+    found = [
+        row for row in rows(result) if row.pair.adaptation_rate is not None and row.pair.bandwidth is not None
+    ]
+    own = [row for row in found if row.decides]
+    others = [row for row in found if row.section == DISTANCE.key and row.verdict is Verdict.CERTIFIED]
+    if not own or not others:
+        return
+    best = min(others, key=_adaptation)
+    if 2 * _adaptation(best) <= _adaptation(own[0]) or own[0].verdict is not Verdict.CERTIFIED:
+        yield (
+            "or",
+            f"{best.text()}, by {NAMES[best.section]}: --conditions B",
+        )
+
+
+def _adaptation(row: Gains) -> Fraction:
+    return row.pair.adaptation_rate or Fraction(0)
+
+
+def beyond_its_theorem(result: Result) -> Iterator[tuple[str, str]]:
+    """Why certificate A decides nothing though it has gains: what acts is more than it is stated for."""
+    section = result.sections.get(RATES.key)
+    acts = result.claim.wind is not None or result.claim.parameters is not None
+    if acts and section is not None and section.verdict == Verdict.UNDECIDED:
+        yield "undecided", f"certificate {NAMES[RATES.key]}: {SAYS['wind_not_covered']}"
+
+
+def without_adaptation(result: Result) -> Iterator[tuple[str, str]]:
+    """What adaptation is for: how much uncertainty the feedback alone can take in this tube."""
+    section, h = result.sections.get(ALONE.key), result.constants.get("h")
+    if not isinstance(section, AloneData) or h is None or h.above is None:
+        return
+    limit = (
+        "no |h|" if section.uncertainty_limit is None else f"every |h| < {down(section.uncertainty_limit)}"
+    )
+    known: Mapping[str, object] = result.spec.effective.part("system").get("parameters", {})
+    ranges = any(not isinstance(value, str) for value in known.values())
+    joined = result.spec.effective.part("disturbance") or ranges
+    whole = "|h| with what wind and parameters add to it" if joined else "|h|"
+    end = ": this tube needs no adaptation" if section.verdict is Verdict.CERTIFIED else ""
+    yield "alone", f"feedback alone can take {limit}; there is {whole} <= {up(h.above)}{end}"
+
+
+# -- section by section
 
 
 def gains_table(result: Result) -> Table | None:
@@ -172,7 +324,8 @@ def gains_table(result: Result) -> Table | None:
     columns = ("certificate", "gains", "verdict", "ω (rad/s)", "Γ", "margin left")
     note = (
         "Each row stands on its own: do not take ω from one row and Γ from another. The row marked * "
-        "decides the verdict."
+        "decides the verdict. Gains that are certified are the least that were proven, so a margin of next to nothing "
+        "is no sign of danger."
     )
     decided = any(row.decides for row in found)
     return Table(columns=columns, rows=tuple(map(_gains_row, found)), note=note if decided else "")
@@ -186,10 +339,7 @@ def _gains(result: Result) -> Iterator[Block]:
         NAMES[key] for key in NAMES if key in result.sections and all(r.section != key for r in found)
     ]:
         yield Words(text=f"No gains were found for {', '.join(missing)}.")
-    yield from (Words(text=line) for line in sections.less_by_distance(result))
-    yield from (Words(text=line) for line in sections.beyond_its_theorem(result))
-    yield from (Words(text=line) for line in sections.without_adaptation(result))
-    yield from _reasons(result, certified=True)
+    yield from reasons(result, [each for each in result.reasons if each.verdict is Verdict.CERTIFIED])
     if curves := tuple(gain_figures(result)):
         yield Figures(figures=curves)
 
@@ -201,7 +351,7 @@ def _gains_row(row: Gains) -> tuple[Cell, ...]:
         Cell(text=row.verdict, kind="verdict"),
         *(
             Cell(text="" if gain is None else exact(gain), kind="number")
-            for gain in sections.gain_columns(row)
+            for gain in (row.pair.bandwidth, row.pair.adaptation_rate)
         ),
         Cell(text=row.slack, kind="number"),
     )
@@ -256,9 +406,7 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
     known = widths(result)
     if known:
         yield "half-widths", Cell(text=reach.half_widths(result, known))
-        for line in reach.asked_for(result, known):
-            words, _, rest = line.partition(": ")
-            yield words, Cell(text=rest)
+        yield from (("asked for", Cell(text=told)) for told in reach.asked_for(result, known))
     for line in reach.clearances(result):
         yield "obstacles", Cell(text=line)
     yield "claimed", Cell(text=claimed.span(result))
@@ -329,10 +477,27 @@ def _metric(metric: MetricData, tube: TubeData | None) -> Iterator[Block]:
     ]
     if metric.largest_rate is not None:
         facts.append(("supports rates up to", Cell(text=f"{down(metric.largest_rate.below, 7)} 1/s")))
-    facts += [(words, Cell(text=bounds)) for words, bounds in sections.metric_bounds(metric, tube)]
+    facts += [(words, Cell(text=bounds)) for words, bounds in _metric_bounds(metric, tube)]
     yield Facts(facts=tuple(facts))
     yield Listing(text=_entries(metric), math=named("W", matrix(metric.dual_metric)))
     yield Words(text="W is the dual metric, the inverse of M; it is symmetric.")
+
+
+def _metric_bounds(metric: MetricData, tube: TubeData | None) -> Iterator[tuple[str, str]]:
+    """Where the metric is bounded, and by what; over a tube with coordinates, by S'S."""
+    plain = tube is None or tube.coordinates is None
+    unit = "I" if plain else "S'S"
+    for words, a, A, of in (
+        (
+            "over the tube" if plain else "over the tube (z = S x: its coordinates)",
+            metric.lower,
+            metric.upper,
+            unit,
+        ),
+        ("on the safe set", metric.lower_on_set, metric.upper_on_set, "I"),
+    ):
+        if a is not None and A is not None:
+            yield words, f"{down(a.below)} {of} <= M <= {up(A.above)} {of}"
 
 
 def _entries(metric: MetricData) -> str:
@@ -370,9 +535,24 @@ def _constant(result: Result, name: str, item: Bound) -> tuple[Cell, ...]:
     at, own = "" if item.at is None else claimed.point(result, item.at), meaning(name)
     return (
         Cell(text=own.symbol, kind="code"),
-        Cell(text=sections.described(name), note=f"at {at}" if at else ""),
-        Cell(text=sections.proven(name, item), kind="number"),
+        Cell(text=meaning(name).words, note=f"at {at}" if at else ""),
+        Cell(text=_safe_side(name, item), kind="number"),
         Cell(text=own.unit if own.unit != "1" else UNKNOWN),
         Cell(text=own.equation),
-        Cell(text=sections.gap(item), kind="number"),
+        Cell(text=_gap(item), kind="number"),
     )
+
+
+def _safe_side(name: str, item: Bound) -> str:
+    """The side that the certificate uses: from below for an infimum, from above for a supremum."""
+    if meaning(name).side == "below":
+        return f">= {down(item.below, 6)}"
+    return f"<= {up(item.above, 6)}"
+
+
+def _gap(item: Bound) -> str:
+    """How far the two proven sides are apart, relative to the larger one."""
+    low, high = item.below, item.above
+    if low is None or high is None or low < 0 < high:
+        return UNKNOWN
+    return "exact" if low == high else f"{up(100 * (high - low) / max(abs(low), abs(high)), 2)} %"
