@@ -16,14 +16,13 @@ from tubecert.sampled_loop.record import (
     InputUse,
     Nominal,
     Notes,
-    PlanKnots,
     Recipe,
     Result,
     Source,
     Stage,
     Tables,
 )
-from tubecert.spec import canonical, load_text
+from tubecert.spec import Knots, canonical, load_text
 from tubecert.verdict import Verdict
 
 REST = "{kind: equilibrium, at: [0.5, 0], input: [0.5]}"
@@ -70,7 +69,7 @@ def certificate(
     arithmetic: str = "double",
     hold: str = "middle",
     afterwards: str = "nothing",
-    planned: PlanKnots | None = None,
+    planned: Knots | None = None,
     controller: Tables | None = None,
     **changes: object,
 ) -> Certificate:
@@ -109,8 +108,8 @@ def certificate(
     return seal(Result(**(fields | changes)), Notes(), {})
 
 
-def held_knots() -> PlanKnots:
+def held_knots() -> Knots:
     """u* jumps at t = .1 and .2; x* is at rest at the knots."""
     rest = (Fraction(0), Fraction(0))
     t, u = (Fraction(0), Fraction("0.1"), Fraction("0.2")), ((Fraction(1),), (Fraction(2),), (Fraction(3),))
-    return PlanKnots(t=t, x=(rest,) * 3, u=u, interpolation="hold")
+    return Knots(t=t, x=(rest,) * 3, u=u, interpolation="hold")

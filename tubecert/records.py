@@ -241,7 +241,7 @@ def _record(kind: Any, data: dict[str, Json], path: str) -> Any:
         raise FormError(f"{path}.{sorted(left)[0]}", "is not known")
     try:
         return kind(**values)
-    except ValueError as error:  # what the record asserts of its values
+    except (ValueError, AssertionError) as error:  # what the record asserts of its values
         raise FormError(path, f"is inconsistent: {error}") from error
 
 

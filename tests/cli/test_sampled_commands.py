@@ -42,9 +42,10 @@ def folder(tmp_path, monkeypatch):
 def stand_in(monkeypatch):
     """What certifies, until a test puts something else in its place."""
 
-    def certify(spec, *, settings=None, report=None, command=""):
+    def certify(spec, report=None):
         lacks = [Lack(kind="inputs", where="F", needed=9.0, allowed=2.0)] if spec.limits[0][1][1] < 3 else []
         text = spec.source.replace("rate: 500", f"rate: {1 / spec.hardware.sample_time}")
+        settings = dict(spec.settings)
         return sampled.undecided(*lacks, settings=settings) if lacks else sampled.certificate(text, settings)
 
     monkeypatch.setattr(certification, "certify", certify)

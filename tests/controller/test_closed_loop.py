@@ -51,7 +51,7 @@ def errors(controller, hold, lost=range(0)):
 @pytest.mark.parametrize("hold", ["middle", "left"])
 def test_the_loop_stays_in_its_tube_and_returns_to_it(hold):
     spec = load_text(SPEC.replace("HOLD", hold), "cart.yaml")
-    proven = certify(spec, settings={}, report=None, command="")
+    proven = certify(spec)
     widths = [float(max(stage.half_widths[name] for stage in proven.result.tube)) for name in "pv"]
     controller = Controller(data_of(proven), LANES)
     assert (errors(controller, hold) < widths).all()

@@ -96,14 +96,16 @@ def test_pages_and_comparisons_take_the_value(cart, tmp_path):
 def test_certify_answers_for_hardware_and_refuses_what_is_about_metrics(monkeypatch):
     asked = {}
 
-    def certify(spec, *, settings, report, command):
-        asked.update(name=spec.name, settings=settings, command=command)
+    def certify(spec, report):
+        asked.update(name=spec.name, settings=dict(spec.settings))
         return sampled.certificate()
 
     monkeypatch.setattr(certification, "certify", certify)
     question = tc.load(tc.specification(sampled.SPEC), settings={"hardware.rate": 400})
-    assert tc.certify(question).certified
-    assert asked == {"name": "cart", "settings": {"hardware.rate": "400"}, "command": "tubecert.certify"}
+    found = tc.certify(question)
+    assert found.certified
+    assert found.certificate.run["command"] == "tubecert.certify"
+    assert asked == {"name": "cart", "settings": {"hardware.rate": "400"}}
     with pytest.raises(tc.SpecError) as refused:
         tc.certify(question, rho_a=0.1, conditions="B", deadline=3, jobs=2)
     about = {str(item.location).partition(":")[0] for item in refused.value.findings}

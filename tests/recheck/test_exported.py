@@ -12,10 +12,10 @@ from tubecert.controller.folder import files_of, marked, write
 from tubecert.recheck.document import read
 from tubecert.recheck.sampled_loop.exported import compared, exported
 from tubecert.sampled_loop.file import certificate_text
-from tubecert.sampled_loop.record import PlanKnots
+from tubecert.spec import Knots
 
 WAVE = {"trajectory": handmade.WAVE % ""}
-CUBICS = PlanKnots(
+CUBICS = Knots(
     t=(Q(0), Q("0.07"), Q("0.2")),
     x=((Q(0), Q(0)), (Q("0.1"), Q("0.3")), (Q(0), Q("0.1"))),
     u=((Q(1),), (Q("0.3"),), (Q(-1),)),

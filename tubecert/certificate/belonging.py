@@ -19,11 +19,10 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.records import from_json, to_json
-from tubecert.spec import Setting, Spec, canonical
+from tubecert.spec import Knots, Setting, Spec, canonical
 from tubecert.spec.load import again
 from tubecert.spec.types import Table
 
-Rows = tuple[tuple[Fraction, ...], tuple[tuple[Fraction, ...], ...], tuple[tuple[Fraction, ...], ...]]
 _IDLE = ("name", "expect", "simulation", "system.units", "trajectory.file")
 
 
@@ -85,12 +84,12 @@ def compared(spec: Spec, result: Result) -> Belonging:
 
 
 def compared_canonically(
-    spec: Spec, effective: Mapping[str, Any], settings: Mapping[str, str], file_hash: str, knots: Rows | None
+    spec: Spec, effective: Mapping[str, Any], settings: Mapping[str, str], file_hash: str, knots: Knots | None
 ) -> Belonging:
-    """The same of a certificate that rests on the specification, the keys that were set, and knots t, x, u alone."""
+    """The same of a certificate that rests on the specification, the keys that were set, and knots alone."""
     own = as_set(spec, settings)
     differing, table = _differing(canonical(own), effective), own.trajectory.table
-    if table is not None and (table.knots.t, table.knots.x, table.knots.u) != knots:
+    if table is not None and table.knots != knots:
         differing.append(f"the knots of {table.file}")
     rewritten = _hash(hashlib.sha256(spec.source.encode()).hexdigest()) != file_hash
     return Belonging(

@@ -135,7 +135,7 @@ def _sampled(spec: Spec, options: CheckOptions, progress: Progress | None) -> Ou
     from tubecert.checking.sampled import outcome as outcome_of
     from tubecert.loop_design.certification import certify
 
-    return outcome_of(certify(spec, settings=dict(spec.settings), report=progress))
+    return outcome_of(certify(spec, progress))
 
 
 def _verified(spec: Spec, options: CheckOptions, progress: Progress | None) -> Outcome:

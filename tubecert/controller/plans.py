@@ -24,7 +24,7 @@ from tubecert.expression import FUNCTIONS
 from tubecert.findings import Finding
 from tubecert.model import build
 from tubecert.sampled_loop.record import Result
-from tubecert.spec import Hardware, Knots, Spec, load_text
+from tubecert.spec import Hardware, Spec, load_text
 from tubecert.trajectory.hermite import intervals
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
@@ -105,11 +105,8 @@ def planned(result: Result, spec: Spec, hardware: Hardware) -> Planned:
 
 
 def _plan(result: Result, spec: Spec) -> Plan:
-    model, own = build(spec), result.planned
-    if own is None:
-        return plan_of(spec, model)
-    knots = Knots(t=own.t, x=own.x, u=own.u, interpolation=own.interpolation)
-    return piecewise_plan(model, knots, spec.trajectory.horizon)
+    model, knots = build(spec), result.planned
+    return plan_of(spec, model) if knots is None else piecewise_plan(model, knots, spec.trajectory.horizon)
 
 
 def _values(plan: Plan, times: Sequence[Fraction]) -> tuple[Array, Array]:

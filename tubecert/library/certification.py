@@ -67,16 +67,11 @@ class Points:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class Certification(Stated):
+class Certification(Stated[Certificate]):
     """What a certification came to, whatever its verdict.
 
-    `certificate` has every key of the certificate as a value; `text` is its file. `specification` is what was
-    certified, with the metric and the radii that were given beside it.
+    `specification` is what was certified, with the metric and the radii that were given beside it.
     """
-
-    certificate: Certificate = field(repr=False)
-    text: str = field(repr=False)
-    given: Specification | None = field(default=None, repr=False)
 
     # the verdict
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tubecert import certificate
 from tubecert.executor import Executor, held
@@ -120,19 +120,23 @@ def certified(
     from tubecert.library.certification import certification_of
     from tubecert.stages.options import overridden
 
-    started, clock = datetime.now(UTC), time.perf_counter()
+    run = ran(command)
     deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
     with held(workers) as helpers:
         result = pipeline.certify(spec, options, progress, deadline=deadline, kept=kept, workers=helpers)
-    run = {
+    sealed = certificate.seal(result.to_json(), run())
+    return certification_of(sealed, Specification(spec=overridden(spec, options)))
+
+
+def ran(command: str) -> Callable[[], dict[str, Any]]:
+    """What is noted of a run that begins now, once it is over: command line, beginning, seconds, versions."""
+    started, clock = datetime.now(UTC), time.perf_counter()
+    return lambda: {
         "command": command,
         "started": started.isoformat(timespec="seconds"),
         "seconds": round(time.perf_counter() - clock, 3),
         "versions": versions(),
     }
-    return certification_of(
-        certificate.seal(result.to_json(), run), Specification(spec=overridden(spec, options))
-    )
 
 
 def _check_words(conditions: str | None, numbers: CertificationNumbers) -> None:

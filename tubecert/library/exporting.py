@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import Any
 
 from tubecert.controller.data import data_of
 from tubecert.controller.folder import files_of, write
@@ -23,7 +24,7 @@ class Exported:
     work: int
 
 
-def export(result: Stated | File, folder: File) -> Exported:
+def export(result: Stated[Any] | File, folder: File) -> Exported:
     """Writes the controller of a certificate of the sampled loop, or of the file of one, into a folder.
 
     Raises `TubecertError` for a certificate that says less than `certified` or has no controller (TC710), and

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tubecert.certificate.file import KIND, unreadable
 from tubecert.errors import ExitCode
@@ -66,7 +66,7 @@ class Rechecked:
 
 
 def recheck(
-    result: Stated | File,
+    result: Stated[Any] | File,
     *,
     budget: int | None = None,
     deadline: Number | None = None,

@@ -6,16 +6,16 @@ In: a specification with `hardware`, or a certificate. Out: views of what the ce
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from fractions import Fraction
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.library.certifying import ran
 from tubecert.library.specification import Specification
-from tubecert.library.stated import Stated, array, rounded_up
+from tubecert.library.stated import Stated, array, rounded, rounded_up
 from tubecert.progress import Phase, Progress, Step
 from tubecert.sampled_loop.file import certificate_text
 from tubecert.sampled_loop.record import Certificate, Result, Shares
@@ -45,15 +45,8 @@ class Tube:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class SampledCertification(Stated):
-    """What the certification of a sampled loop came to, whatever its verdict.
-
-    `certificate` has every key of the certificate as a value; `text` is its file. `given` is what was asked about.
-    """
-
-    certificate: Certificate = field(repr=False)
-    text: str = field(repr=False)
-    given: Specification | None = field(default=None, repr=False)
+class SampledCertification(Stated[Certificate]):
+    """What the certification of a sampled loop came to, whatever its verdict."""
 
     @property
     def result(self) -> Result:
@@ -81,17 +74,17 @@ class SampledCertification(Stated):
     @property
     def half_widths(self) -> Mapping[str, float]:
         """How far each state can be from the plan at any time, in its unit; empty if nothing is proven."""
-        return _rounded_up(self.result.half_widths)
+        return rounded(self.result.half_widths)
 
     @property
     def start(self) -> Mapping[str, float]:
         """The same from the first sample on, until the tube gets narrower."""
-        return _rounded_up(self.result.tube[0].half_widths if self.certified else {})
+        return rounded(self.result.tube[0].half_widths if self.certified else {})
 
     @property
     def long_run(self) -> Mapping[str, float]:
         """The same in the long run, when the start is forgotten: from sample `result.tube[-1].start` on."""
-        return _rounded_up(self.result.tube[-1].half_widths if self.certified else {})
+        return rounded(self.result.tube[-1].half_widths if self.certified else {})
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:
@@ -181,10 +174,10 @@ def certified(spec: Spec, *, progress: Progress | None, command: str) -> Sampled
     """The sealed answer for a specification with `hardware`; `command` is noted as its origin."""
     from tubecert.loop_design.certification import certify
 
+    run = ran(command)
     if progress is not None:
         progress(Step(phase=Phase.LOOP))
-    found = certify(spec, settings=dict(spec.settings), report=progress, command=command)
-    return certification_of(found, Specification(spec=spec))
+    return certification_of(replace(certify(spec, progress), run=run()), Specification(spec=spec))
 
 
 def certification_of(certificate: Certificate, given: Specification | None = None) -> SampledCertification:
@@ -196,13 +189,8 @@ def compared(spec: Spec, result: Result) -> Belonging:
     """A certificate's result against a specification."""
     from tubecert.certificate.belonging import compared_canonically
 
-    own, plan = result.spec, result.planned
-    knots = None if plan is None else (plan.t, plan.x, plan.u)
-    return compared_canonically(spec, own.effective.data, own.settings, own.file_hash, knots)
-
-
-def _rounded_up(values: Mapping[str, Fraction]) -> Mapping[str, float]:
-    return MappingProxyType({name: rounded_up(value) for name, value in values.items()})
+    own = result.spec
+    return compared_canonically(spec, own.effective.data, own.settings, own.file_hash, result.planned)
 
 
 def _parts(shares: Shares) -> Mapping[str, float]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -24,25 +25,19 @@ if TYPE_CHECKING:
     from tubecert.sampled_loop.record import Certificate as SampledCertificate
 
 
-class Stated:
-    """A certificate as a value: `text` is its file, `given` the specification as it was asked about, if it was."""
+C = TypeVar("C", bound="Certificate | SampledCertificate")
 
-    __slots__ = ()
 
-    @property
-    def certificate(self) -> Certificate | SampledCertificate:
-        """Every key of the certificate as a value."""
-        raise NotImplementedError
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Stated(Generic[C]):
+    """A certificate as a value: `certificate` has every key of it as a value, `text` is its file.
 
-    @property
-    def text(self) -> str:
-        """The text of its file."""
-        raise NotImplementedError
+    `given` is the specification as it was asked about, if it was.
+    """
 
-    @property
-    def given(self) -> Specification | None:
-        """What was asked about; None of a certificate that was read."""
-        raise NotImplementedError
+    certificate: C
+    text: str
+    given: Specification | None = None
 
     @property
     def effective(self) -> Effective:
@@ -107,6 +102,11 @@ def rounded_up(value: Fraction) -> float:
     """The float whose shortest decimal is the nearest one that is not below the value."""
     near = float(value)
     return near if Fraction(repr(near)) >= value else float(np.nextafter(near, np.inf))
+
+
+def rounded(values: Mapping[str, Fraction]) -> Mapping[str, float]:
+    """Of every name the same."""
+    return MappingProxyType({name: rounded_up(value) for name, value in values.items()})
 
 
 def array(values: ArrayLike) -> Array:

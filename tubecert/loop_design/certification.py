@@ -6,10 +6,8 @@ What is designed and proposed here is untrusted; the verdict is that of `sampled
 from __future__ import annotations
 
 import hashlib
-import time
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from typing import Final
 
@@ -21,32 +19,20 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.expression.matrix import identity
-from tubecert.findings import Finding
-from tubecert.libraries import versions
 from tubecert.loop_design.design import Design, design
 from tubecert.loop_design.plant import Plant
-from tubecert.loop_design.proposal import NoTubeError, propose
+from tubecert.loop_design.proposal import propose
 from tubecert.loop_design.shares import explain
 from tubecert.loop_design.surrogate import fitted
 from tubecert.loop_design.unfound import NoDesign
-from tubecert.model import ControlAffineModel, build, domain_findings
+from tubecert.model import ControlAffineModel, build
 from tubecert.planner import propose as planner
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.sampled_loop.file import seal
-from tubecert.sampled_loop.record import (
-    Certificate,
-    Claim,
-    HexMatrix,
-    Lack,
-    Nominal,
-    Notes,
-    PlanKnots,
-    Result,
-    Source,
-)
+from tubecert.sampled_loop.record import Certificate, Claim, HexMatrix, Lack, Nominal, Notes, Result, Source
 from tubecert.sampled_loop.remainders import Remainders
-from tubecert.sampled_loop.setting import Controller, Loop
-from tubecert.sampled_loop.theorem import check
+from tubecert.sampled_loop.setting import Loop
+from tubecert.sampled_loop.theorem import check, undefined
 from tubecert.spec import Knots, Spec, canonical
 from tubecert.trajectory.make import Room, plan_of
 from tubecert.verdict import Verdict
@@ -54,85 +40,37 @@ from tubecert.verdict import Verdict
 _WINDOWS: Final = 256
 _FEW: Final = 48  # windows for a search
 _TRIES: Final = 4  # designs with ever less room, where a proof needs more than floats
-_SHARE: Final = 0.05  # of the safe set: where the remainder is fitted
+_SHARE: Final = 0.1  # of the safe set: where the remainder is fitted
 _ROOM: Final = 1.0  # of an input without limits, there
 
 
-def certify(
-    spec: Spec,
-    *,
-    settings: Mapping[str, str] | None = None,
-    report: Progress | None = None,
-    command: str = "tubecert.certify",
-) -> Certificate:
-    """The certificate of the sampled loop; raises `SpecError` for what makes the question meaningless."""
-    started, clock = datetime.now(UTC), time.perf_counter()
-    question = ask(spec, report)
-    result, notes = _answer(question, dict(settings or {}), report)
-    run = {
-        "command": command,
-        "started": started.isoformat(timespec="seconds"),
-        "seconds": round(time.perf_counter() - clock, 3),
-        "versions": versions(),
-    }
-    return seal(result, notes, run)
+def certify(spec: Spec, report: Progress | None = None) -> Certificate:
+    """The certificate of the sampled loop, which does not say yet how it came about (`run`).
+
+    Raises `SpecError` for what makes the question meaningless.
+    """
+    remainders = ask(spec, report)
+    if hopeless := tuple(_hopeless(remainders)):
+        return seal(replace(_result(remainders.loop), lacks=hopeless), Notes(), {})
+    return seal(*_answer(remainders, report), {})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Question:
-    """The loop whose tables are still to be found, and its suprema."""
+def ask(spec: Spec, report: Progress | None = None) -> Remainders:
+    """The loop whose tables are still to be found, with its suprema.
 
-    loop: Loop
-    remainders: Remainders
-
-
-def ask(spec: Spec, report: Progress | None = None) -> Question:
-    """The loop of a specification, with matrices in the middle of what its Jacobians are along the plan."""
+    Its matrices are in the middle of what its Jacobians are along the plan.
+    """
     model = build(spec)
     knots = _knots(spec, model, report)
     n, m, k = len(spec.states), len(spec.inputs), len(model.E[0]) if model.E else 0
-    blank = Loop(
-        spec=spec,
-        model=model,
-        plan=plan_of(spec, model, knots),
-        knots=None
-        if knots is None
-        else PlanKnots(t=knots.t, x=knots.x, u=knots.u, interpolation=knots.interpolation),
-        A=np.zeros((n, n)),
-        B=np.zeros((n, m)),
-        E=np.zeros((n, k)),
-        slow=False,
-    )
-    _refuse(blank)
+    A, B, E = (np.zeros((n, size)) for size in (n, m, k))
+    plan = plan_of(spec, model, knots)
+    blank = Loop(spec=spec, model=model, plan=plan, knots=knots, A=A, B=B, E=E, slow=False)
+    if findings := undefined(blank):
+        raise SpecError(findings)
     rough = Remainders(blank, _WINDOWS)
     A, B, E = rough.middle()
-    loop = replace(blank, A=A, B=B, E=E, slow=rough.smooth)
-    return Question(loop=loop, remainders=Remainders(loop, _WINDOWS))
-
-
-def _refuse(loop: Loop) -> None:
-    """Raises `SpecError` for what no theorem is about."""
-    spec = loop.spec
-    try:
-        times = loop.times
-    except ValueError:
-        text = "h depends on t for ever, without a period that can be seen"
-        raise SpecError(
-            [_finding(spec, "TC204", "uncertainty.h", text, "give trajectory.horizon, in s")]
-        ) from None
-    findings = domain_findings(spec, times, Effort(budget=200_000))
-    if findings:
-        raise SpecError(findings)
-    if not loop.goes_on():
-        text = (
-            "the plan does not repeat: its ends differ, or its period is longer than the horizon or unknown"
-        )
-        help = "leave out afterwards, or give a plan whose period is not longer than trajectory.horizon"
-        raise SpecError([_finding(spec, "TC204", "trajectory.afterwards", text, help)])
-
-
-def _finding(spec: Spec, code: str, path: str, message: str, help: str) -> Finding:
-    return Finding(code=code, message=message, location=spec.location(path), help=help)
+    return Remainders(replace(blank, A=A, B=B, E=E, slow=rough.steep is not None), _WINDOWS)
 
 
 def _knots(spec: Spec, model: ControlAffineModel, report: Progress | None) -> Knots | None:
@@ -150,30 +88,21 @@ def _knots(spec: Spec, model: ControlAffineModel, report: Progress | None) -> Kn
     return planner.knots_of(spec, course, whole, room, report)
 
 
-def _answer(question: Question, settings: Mapping[str, str], report: Progress | None) -> tuple[Result, Notes]:
+def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, Notes]:
     """Tables, stages and what is proven of them; with less room for the inputs where the proof finds too little."""
-    loop = question.loop
-    plain = _result(loop, settings)
-    notes = Notes()
-    if hopeless := list(_hopeless(question)):
-        return replace(plain, lacks=tuple(hopeless)), notes
-    narrow = np.ones(loop.inputs)
+    loop, notes = remainders.loop, Notes()
+    plain, narrow = _result(loop), np.ones(loop.inputs)
     for _ in range(_TRIES):
         try:
-            found = _tables(question, narrow, report)
-            tables = Controller(found.F, found.G, found.M, found.N)
-            inequalities, stages = propose(question.remainders, tables, _told(report, "tube"))
+            tables = _tables(remainders, narrow, report)
+            inequalities, stages = propose(remainders, tables, _told(report, "tube"))
         except NoDesign as error:
-            lack = Lack(
-                kind=error.kind, where=_named(loop, error), needed=error.needed, allowed=error.allowed
-            )
-            return replace(plain, lacks=(lack,)), notes
-        except NoTubeError as error:
-            wide = int(np.argmax(error.W / _half(loop)))
-            lack = Lack(kind="no_fixed_point", where=loop.model.states[wide])
+            names = loop.model.inputs if error.kind == "inputs" else loop.model.states
+            where = "" if error.where is None else names[error.where]
+            lack = Lack(kind=error.kind, where=where, needed=error.needed, allowed=error.allowed)
             return replace(plain, lacks=(lack,)), notes
         checked = check(loop, tables, stages, inequalities.recipe, inequalities)
-        notes = explain(inequalities, stages, found.evaluations)
+        notes = explain(inequalities, stages, tables.evaluations)
         over = {lack.where: lack for lack in checked.lacks if lack.kind == "inputs"}
         result = replace(
             plain,
@@ -194,30 +123,19 @@ def _answer(question: Question, settings: Mapping[str, str], report: Progress | 
     return result, notes
 
 
-def _hopeless(question: Question) -> Iterator[Lack]:
+def _hopeless(remainders: Remainders) -> Iterator[Lack]:
     """What no controller could mend: a start outside of all that is allowed, a plan beyond the limits."""
-    loop, own = question.loop, question.remainders
-    wishes = dict(loop.spec.tube.half_widths)
-    states = zip(loop.model.states, loop.start.reach, _space(loop, own), strict=True)
-    for name, reach, space in states:
+    loop = remainders.loop
+    wishes, limits = dict(loop.spec.tube.half_widths), dict(loop.spec.limits)
+    for name, reach, space in zip(loop.model.states, loop.start.reach, _space(remainders), strict=True):
         most = min(space, float(wishes.get(name, np.inf)))
         if reach >= most:
             yield Lack(kind="start", where=name, needed=float(reach), allowed=float(most))
-    limits = dict(loop.spec.limits)
-    for name, low, high in zip(loop.model.inputs, *own.inputs_range, strict=True):
+    for name, low, high in zip(loop.model.inputs, *remainders.inputs_range, strict=True):
         least, most = map(float, limits.get(name, (-np.inf, np.inf)))
         if low < least or high > most:
             end, limit = (low, least) if low < least else (high, most)
             yield Lack(kind="plan", where=name, needed=float(end), allowed=limit)
-
-
-def _half(loop: Loop) -> Array:
-    return np.array([float(high - low) / 2 for low, high in loop.spec.safe_set])
-
-
-def _named(loop: Loop, error: NoDesign) -> str:
-    names = loop.model.inputs if error.kind == "inputs" else loop.model.states
-    return names[error.where] if isinstance(error.where, int) else str(error.where or "")
 
 
 def _told(report: Progress | None, name: str) -> Callable[[int, object], None] | None:
@@ -226,46 +144,28 @@ def _told(report: Progress | None, name: str) -> Callable[[int, object], None] |
     return lambda count, _: report(Step(phase=Phase.LOOP, name=name, count=count, unit=Unit.STEPS))
 
 
-def _tables(question: Question, narrow: Array, report: Progress | None) -> Design:
+def _tables(remainders: Remainders, narrow: Array, report: Progress | None) -> Design:
     """What is designed; no controller has tables of nothing."""
-    loop = question.loop
+    loop = remainders.loop
+    if loop.spec.controller != "none":
+        return design(plant_of(remainders, narrow), _told(report, "controller"))
     n, m = loop.states, loop.inputs
-    if loop.spec.controller == "none":
-        return Design(
-            F=np.zeros((0, 0)),
-            G=np.zeros((0, n)),
-            M=np.zeros((m, 0)),
-            N=np.zeros((m, n)),
-            W=np.zeros(n),
-            U=np.zeros(m),
-            evaluations=0,
-        )
-    return design(plant_of(question, narrow), _told(report, "controller"))
+    shapes = {"F": (0, 0), "G": (0, n), "M": (m, 0), "N": (m, n), "W": (n,), "U": (m,)}
+    return Design(**{name: np.zeros(shape) for name, shape in shapes.items()}, evaluations=0)
 
 
-def plant_of(question: Question, narrow: Array) -> Plant:
+def plant_of(remainders: Remainders, narrow: Array) -> Plant:
     """The error equation in floats, with `narrow` (m,) of the room that the inputs have."""
-    loop, own = question.loop, question.remainders
-    n = loop.states
-    low, high = own.inputs_range
-    limits = dict(loop.spec.limits)
-    room = np.array(
-        [
-            min(float(limits[name][1]) - high[j], low[j] - float(limits[name][0]))
-            if name in limits
-            else np.inf
-            for j, name in enumerate(loop.model.inputs)
-        ]
-    )
-    room = np.where(room > 0, room * narrow, 0.0)
-    sizes = own.sizes(np.zeros(n))
-    winds = loop.sudden
-    asked = dict(loop.spec.tube.half_widths)
+    loop, winds = remainders.loop, remainders.loop.sudden
+    room = np.where(remainders.room > 0, remainders.room * narrow, 0.0)
+    sizes, asked = remainders.sizes(np.zeros(loop.states)), dict(loop.spec.tube.half_widths)
+    low, high = np.array(loop.spec.safe_set, dtype=float).T
+    reach = np.where(np.isfinite(room) & (room > 0), room, _ROOM)
     return Plant(
         A=loop.A,
         B=loop.B,
         H=loop.H,
-        E=np.hstack([np.zeros((n, 0)), *(columns for columns, _ in winds)]),
+        E=np.hstack([loop.E[:, :0], *(columns for columns, _ in winds)]),
         sample_time=float(loop.sample_time),
         delay=float(loop.delay),
         noise=loop.noise.each,
@@ -277,35 +177,29 @@ def plant_of(question: Question, narrow: Array) -> Plant:
         wind_ball=len(winds) == 1 and winds[0][1].length,
         room=room,
         wishes=np.array([float(asked.get(name, np.inf)) for name in loop.model.states]),
-        space=_space(loop, own),
+        space=_space(remainders),
         start=loop.start.reach,
-        remainder=fitted(Remainders(loop, _FEW), _reach(loop, room)),
+        remainder=fitted(Remainders(loop, _FEW), np.concatenate([_SHARE * (high - low), reach])),
     )
 
 
-def _space(loop: Loop, remainders: Remainders) -> Array:
+def _space(remainders: Remainders) -> Array:
     """How far the plan is from the ends of the safe set, (n,)."""
-    ends = np.array([(float(low), float(high)) for low, high in loop.spec.safe_set])
+    low, high = np.array(remainders.loop.spec.safe_set, dtype=float).T
     x = remainders.cells.x
-    room = np.minimum(ends[:, 1] - x.hi.max(axis=0), x.lo.min(axis=0) - ends[:, 0])
-    return np.asarray(np.maximum(room, 1e-300))
+    return np.asarray(np.maximum(np.minimum(high - x.hi.max(axis=0), x.lo.min(axis=0) - low), 1e-300))
 
 
-def _reach(loop: Loop, room: Array) -> Array:
-    return np.concatenate([_SHARE * 2 * _half(loop), np.where(np.isfinite(room) & (room > 0), room, _ROOM)])
-
-
-def _result(loop: Loop, settings: Mapping[str, str]) -> Result:
+def _result(loop: Loop) -> Result:
     """What is asked, before anything is found."""
-    spec = loop.spec
-    effective = canonical(spec)
+    spec, effective = loop.spec, canonical(loop.spec)
     return Result(
         verdict=Verdict.UNDECIDED,
         spec=Source(
             effective=Effective.of(effective),
             effective_hash=digest(effective),
             file_hash="sha256:" + hashlib.sha256(spec.source.encode()).hexdigest(),
-            settings=settings,
+            settings=dict(spec.settings),
         ),
         claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
         planned=loop.knots,

@@ -14,6 +14,7 @@ import numpy as np
 
 from tubecert.digits import up
 from tubecert.enclosure.interval import Array
+from tubecert.loop_design.unfound import NoDesign
 from tubecert.sampled_loop.record import Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Dynamics
@@ -35,18 +36,10 @@ _DIGITS: Final = 7
 Report = Callable[[int, Array], None]
 
 
-class NoTubeError(ValueError):
-    """The inequalities have no fixed point that was found; `W` is what they came to, (n,)."""
-
-    def __init__(self, W: Array) -> None:
-        super().__init__("no fixed point")
-        self.W = W
-
-
 def propose(
     remainders: Remainders, controller: Controller, report: Report | None = None
 ) -> tuple[Inequalities, tuple[Stage, ...]]:
-    """Stages that should hold, with the inequalities that say so. Raises `NoTubeError`."""
+    """Stages that should hold, with the inequalities that say so. Raises `NoDesign`."""
     loop = remainders.loop
     lags = _lags(loop, controller)
     outputs = loop.states + loop.inputs + controller.size
@@ -137,14 +130,14 @@ def _fixed_point(inequalities: Inequalities, boxes: Boxes, report: Report | None
             if report is not None:
                 report(step, found.W[-1])
             if not np.isfinite(found.W).all() or (widest < found.W).any():
-                raise NoTubeError(found.W[0])
+                raise _none(found, widest)
             if _within(found, boxes, 1 + 1e-4) and _within(boxes, found, 1 + 1e-4):
-                return _kept(inequalities, found)
+                return _kept(inequalities, found, widest)
             boxes = found
-    raise NoTubeError(boxes.W[0])
+    raise _none(boxes, widest)
 
 
-def _kept(inequalities: Inequalities, boxes: Boxes) -> Boxes:
+def _kept(inequalities: Inequalities, boxes: Boxes, widest: Array) -> Boxes:
     """Boxes a little wider, which the inequalities map inside themselves; what is quadratic grows most."""
     wider = Boxes(*(_WIDER * own + 1e-30 for own in boxes))
     for _ in range(_STEPS):
@@ -152,7 +145,12 @@ def _kept(inequalities: Inequalities, boxes: Boxes) -> Boxes:
         if _within(found, wider, 1 - 1e-5):
             return wider
         wider = Boxes(*(np.maximum(old, (1 + 1e-4) * new) for old, new in zip(wider, found, strict=True)))
-    raise NoTubeError(wider.W[0])
+    raise _none(wider, widest)
+
+
+def _none(boxes: Boxes, widest: Array) -> NoDesign:
+    """No fixed point was found: where the boxes had grown most."""
+    return NoDesign("no_fixed_point", int(np.argmax(boxes.W[0] / widest)))
 
 
 def _within(inner: Boxes, outer: Boxes, share: float) -> bool:

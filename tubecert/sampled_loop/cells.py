@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import derivatives, free_symbols, symbol
-from tubecert.expression.matrix import column, combine, jacobian, multiply
+from tubecert.expression import derivatives, free_symbols
+from tubecert.expression.matrix import jacobian
 from tubecert.model import TIME
 from tubecert.sampled_loop.setting import Loop
 from tubecert.trajectory.family import Family
@@ -45,8 +45,7 @@ def cells_of(loop: Loop, count: int) -> Cells:
     if plan.horizon is None:  # a point
         nothing = np.zeros(1)
         return Cells(*plan.enclose(nothing, nothing), Interval(nothing, np.array([np.inf])))
-    ends = fraction_bounds(plan.horizon)[1] * np.linspace(0.0, 1.0, count + 1)
-    ends[-1] = fraction_bounds(plan.horizon)[1]
+    ends = np.linspace(0.0, fraction_bounds(plan.horizon)[1], count + 1)
     return Cells(*plan.enclose(ends[:-1], ends[1:]), Interval(ends[:-1], ends[1:]))
 
 
@@ -55,33 +54,28 @@ def _of_family(loop: Loop, count: int) -> Cells:
     zero = np.zeros(1)
     whole = [side[0] for side in loop.plan.enclose(zero, zero)]
     lo, hi = (np.concatenate([getattr(side, end) for side in whole]) for end in ("lo", "hi"))
-    names = (*loop.model.states, *loop.model.inputs)
-    u = column([symbol(name) for name in loop.model.inputs])
-    field = combine(1, column(loop.drift), 1, multiply(loop.gained, u))
-    slopes = jacobian([row[0] for row in field], names)
+    slopes = jacobian(loop.field, loop.names)
     bent = free_symbols([e for row in slopes for e in row])
-    split = [i for i, name in enumerate(names) if name in bent and hi[i] > lo[i]]
-    parts = max(1, int(count ** (1 / len(split)) + 1e-9)) if split else 1
-    edges = {i: np.linspace(lo[i], hi[i], parts + 1) for i in split}
-    for i, each in edges.items():
-        each[0], each[-1] = lo[i], hi[i]
-    choices = list(product(range(parts), repeat=len(split)))
-    picks = np.array(choices, dtype=np.intp).reshape(len(choices), len(split))
-    low, high = np.tile(lo, (len(picks), 1)), np.tile(hi, (len(picks), 1))
-    for place, i in enumerate(split):
-        low[:, i], high[:, i] = edges[i][picks[:, place]], edges[i][picks[:, place] + 1]
-    n = loop.states
-    x, u_cells = Interval(low[:, :n], high[:, :n]), Interval(low[:, n:], high[:, n:])
-    return Cells(x, u_cells, Interval(np.zeros(len(picks)), np.full(len(picks), np.inf)))
+    split = [name in bent and high > low for name, low, high in zip(loop.names, lo, hi, strict=True)]
+    parts = max(1, int(count ** (1 / sum(split)) + 1e-9)) if any(split) else 1
+    counts = [parts + 1 if bends else 2 for bends in split]
+    ends = [np.linspace(a, b, count) for a, b, count in zip(lo, hi, counts, strict=True)]
+    low, high = (
+        np.stack(np.meshgrid(*(own[side] for own in ends), indexing="ij"), axis=-1).reshape(-1, len(lo))
+        for side in (slice(None, -1), slice(1, None))
+    )
+    n, count = loop.states, len(low)
+    x, u = Interval(low[:, :n], high[:, :n]), Interval(low[:, n:], high[:, n:])
+    return Cells(x, u, Interval(np.zeros(count), np.full(count, np.inf)))
 
 
-def in_time(loop: Loop, cells: Cells, *, moves: bool) -> Cells:
+def in_time(loop: Loop, cells: Cells) -> Cells:
     """The cells with the times at which h is there: their own, or every time, where the claim is for ever.
 
-    `moves`: whether h depends on t. Where nothing else is known of it, t is anything from 0 on.
+    Where nothing else is known of an h that depends on t, t is anything from 0 on.
     """
-    own = bool(np.isfinite(cells.t.hi).all())
-    if not moves or (own and loop.horizon is not None):
+    moves = loop.model.h is not None and TIME in free_symbols(loop.model.h)
+    if not moves or (loop.horizon is not None and np.isfinite(cells.t.hi).all()):
         return cells
     if loop.horizon is not None:
         ends = np.linspace(0.0, fraction_bounds(loop.horizon)[1], _TIMES + 1)
@@ -92,11 +86,6 @@ def in_time(loop: Loop, cells: Cells, *, moves: bool) -> Cells:
     k, n = len(ends) - 1, len(cells)
     found = cells.at(np.repeat(np.arange(n), k))
     return Cells(found.x, found.u, Interval(np.tile(ends[:-1], n), np.tile(ends[1:], n)))
-
-
-def moves_in_time(loop: Loop) -> bool:
-    """Whether h depends on t."""
-    return loop.model.h is not None and TIME in free_symbols(loop.model.h)
 
 
 def end_of(loop: Loop) -> Cells | None:

@@ -17,12 +17,10 @@ import numpy as np
 from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
 from tubecert.records import FormError, Json, foreign
+from tubecert.spec.types import Afterwards, Hold, Knots
 from tubecert.verdict import Verdict
 
 FORMAT: Final = "tubecert-sampled-loop/1"
-Hold = Literal["middle", "left", "continuous"]
-Afterwards = Literal["nothing", "rest", "repeat"]
-Interpolation = Literal["hold", "linear", "hermite-simpson"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,16 +108,6 @@ class Recipe:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlanKnots:
-    """The knots that the planner proposed, exact: t (K), x (K, n), u (K, m)."""
-
-    t: tuple[Fraction, ...]
-    x: tuple[tuple[Fraction, ...], ...]
-    u: tuple[tuple[Fraction, ...], ...]
-    interpolation: Interpolation
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
     """The specification: canonical data, its hash, the hash of the file, and what the command line set."""
 
@@ -193,12 +181,15 @@ class Lack:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What is proven of a sampled loop; without a controller that proves it, stages and recipe are missing."""
+    """What is proven of a sampled loop; without a controller that proves it, stages and recipe are missing.
+
+    Where the plan is one through knots, of a planner or a file, `planned` has them.
+    """
 
     verdict: Verdict
     spec: Source
     claim: Claim
-    planned: PlanKnots | None = None
+    planned: Knots | None = None
     nominal: Nominal | None = None
     controller: Tables | None = None
     tube: tuple[Stage, ...] = ()

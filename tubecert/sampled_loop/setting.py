@@ -6,6 +6,7 @@ Implements: theory of the sampled loop, section 1.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -20,12 +21,13 @@ from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.outward import number_above
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import ZERO, Expression, constant, free_symbols
+from tubecert.expression import ZERO, Expression, constant, free_symbols, symbol
+from tubecert.expression.matrix import column, combine, multiply
 from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.sampled_loop.midrad import Known, lengths, total
-from tubecert.sampled_loop.record import Afterwards, HexMatrix, Hold, PlanKnots, Tables
+from tubecert.sampled_loop.record import HexMatrix, Tables
 from tubecert.spec import Spec
-from tubecert.spec.types import Hardware, Vector
+from tubecert.spec.types import Afterwards, Hardware, Hold, Knots, Vector
 from tubecert.trajectory.family import Family
 from tubecert.trajectory.plan import Plan
 
@@ -83,7 +85,7 @@ class Loop:
     spec: Spec
     model: ControlAffineModel
     plan: Plan
-    knots: PlanKnots | None
+    knots: Knots | None
     A: Array
     B: Array
     E: Array
@@ -101,6 +103,11 @@ class Loop:
         """m."""
         return len(self.model.inputs)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """States, then inputs."""
+        return *self.model.states, *self.model.inputs
+
     # the machine
 
     @property
@@ -114,10 +121,10 @@ class Loop:
         """Ts in s."""
         return self.hardware.sample_time
 
-    @cached_property
+    @property
     def delay(self) -> Fraction:
         """tau in s."""
-        return self.sample_time if self.hardware.delay is None else self.hardware.delay
+        return self.hardware.delayed
 
     @property
     def whole(self) -> int:
@@ -164,10 +171,16 @@ class Loop:
         return tuple(j for j in range(self.inputs) if h is None or h[j] != constant(0))
 
     @cached_property
+    def declared(self) -> Array:
+        """Bounds of |h|, of its slope and of its rate, of an h that is not given otherwise, (3,)."""
+        bounds = self.spec.uncertainty.bounds
+        given = (None,) * 3 if bounds is None else (bounds.h, bounds.h_x, bounds.h_t)
+        return np.array([np.inf if each is None else fraction_bounds(each)[1] for each in given])
+
+    @property
     def jumps(self) -> bool:
         """Whether nothing bounds how fast h changes: it is sudden, as a wind through the columns of B."""
-        bounds = self.spec.uncertainty.bounds
-        return self.model.h is None and (bounds is None or bounds.h_x is None or bounds.h_t is None)
+        return self.model.h is None and not np.isfinite(self.declared[1:]).all()
 
     @cached_property
     def unknown(self) -> tuple[int, ...]:
@@ -185,6 +198,11 @@ class Loop:
     def gained(self) -> tuple[tuple[Expression, ...], ...]:
         """B(x, p), (n, m)."""
         return tuple(map(tuple, self.model.gained or self.model.B))
+
+    @cached_property
+    def field(self) -> tuple[Expression, ...]:
+        """F(x, u, p) = f(x, p) + B(x, p) u, (n,)."""
+        return driven(self.drift, self.gained, self.model.inputs)
 
     @cached_property
     def H(self) -> Array:
@@ -206,9 +224,7 @@ class Loop:
         if self.gusts.each.size and not self.sways:
             blocks.append((self.E, self.gusts))
         if self.jumps and self.matched:
-            bounds = self.spec.uncertainty.bounds
-            most = np.inf if bounds is None or bounds.h is None else fraction_bounds(bounds.h)[1]
-            blocks.append((self.B, Size(np.full(self.inputs, most), length=self.inputs > 1)))
+            blocks.append((self.B, Size(np.full(self.inputs, self.declared[0]), length=self.inputs > 1)))
         return tuple(blocks)
 
     # the plan in time
@@ -289,6 +305,14 @@ class Loop:
         bounds = np.array([(*fraction_bounds((a + b) / 2), fraction_bounds((b - a) / 2)[1]) for a, b in ends])
         middle, box = Interval(bounds[:, 0], bounds[:, 1]), bounds[:, 2]
         return Start(Known.of((middle - planned).sanitised()[:, None]), box, 0.0)
+
+
+def driven(
+    f: Sequence[Expression], B: Sequence[Sequence[Expression]], inputs: Sequence[str]
+) -> tuple[Expression, ...]:
+    """f + B u, (n,)."""
+    u = column([symbol(name) for name in inputs])
+    return tuple(row[0] for row in combine(1, column(f), 1, multiply(B, u)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

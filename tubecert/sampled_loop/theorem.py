@@ -22,7 +22,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.enclosure.outward import number_above, number_below
 from tubecert.enclosure.processor import require_ieee
-from tubecert.findings import Severity
+from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel, domain_findings
 from tubecert.sampled_loop.cells import MOST
 from tubecert.sampled_loop.midrad import SUMMED, UNIT, total
@@ -263,9 +263,9 @@ def check(
     above, below = (Boxes.of(stages, loop.model, above=side) for side in (True, False))
     with np.errstate(all="ignore"):  # what is not finite bounds nothing
         found = inequalities.of(above)
-    lacks = [*_short(loop, found, below), *undefined(loop), *_domain(loop, inequalities, above)]
-    lacks += _wishes(loop, stages)
-    if loop.slow and loop.unknown and not inequalities.remainders.smooth:
+    lacks = [*_short(loop, found, below), *_domain(loop, inequalities, above), *_wishes(loop, stages)]
+    lacks += [Lack(kind="undefined", where=item.message) for item in undefined(loop)]
+    if loop.slow and loop.unknown and inequalities.remainders.steep is None:
         lacks.append(Lack(kind="not_proven"))
     inputs, over = _inputs(loop, inequalities.remainders, above)
     clearance = cleared(loop, above.W, starts)
@@ -286,7 +286,6 @@ def _sound(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: 
     return (
         controller.fits(loop)
         and loop.slow == (recipe.parameters == "slow")
-        and loop.goes_on()
         and not (isinstance(loop.plan, Family) and loop.afterwards != "nothing")
         and 1 <= recipe.lags <= MOST_LAGS
         and 1 <= recipe.windows <= MOST
@@ -304,23 +303,29 @@ def _sound(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: 
 
 def _short(loop: Loop, found: Boxes, claimed: Boxes) -> list[Lack]:
     """(a), (b), (c): strict for the error, which is what a first exit is about."""
-    holds = bool(
-        (found.W < claimed.W).all() and (found.U <= claimed.U).all() and (found.Z <= claimed.Z).all()
-    )
-    if holds:
+    wide = ~(found.W < claimed.W).all(axis=0)
+    if not wide.any() and all((own <= most).all() for own, most in zip(found[1:], claimed[1:], strict=True)):
         return []
-    short = np.max(np.where(found.W < claimed.W, 0.0, 1.0), axis=0)
-    where = loop.model.states[int(np.argmax(short))] if short.any() else ""
+    where = loop.model.states[int(np.argmax(wide))] if wide.any() else ""
     return [Lack(kind="no_fixed_point", where=where)]
 
 
-def undefined(loop: Loop) -> list[Lack]:
-    """What is not proven to be defined on the safe set, or at a time that matters."""
+def undefined(loop: Loop) -> list[Finding]:
+    """What is not proven to be defined on the safe set, or at a time that matters; a plan that does not go on."""
+
+    def refused(path: str, message: str, help: str) -> Finding:
+        return Finding(code="TC204", message=message, location=loop.spec.location(path), help=help)
+
     try:
         found = domain_findings(loop.spec, loop.times, _CAREFUL)
     except ValueError:
-        return [Lack(kind="undefined")]
-    return [Lack(kind="undefined", where=item.message) for item in found if item.severity is Severity.ERROR]
+        unseen = "h depends on t for ever, without a period that can be seen"
+        return [refused("uncertainty.h", unseen, "give trajectory.horizon, in s")]
+    if found or loop.goes_on():
+        return found
+    ends = "the plan does not repeat: its ends differ, or its period is longer than the horizon or unknown"
+    help = "leave out afterwards, or give a plan whose period is not longer than trajectory.horizon"
+    return [refused("trajectory.afterwards", ends, help)]
 
 
 def _domain(loop: Loop, inequalities: Inequalities, boxes: Boxes) -> list[Lack]:
@@ -338,18 +343,13 @@ def _domain(loop: Loop, inequalities: Inequalities, boxes: Boxes) -> list[Lack]:
 
 def _wishes(loop: Loop, stages: Sequence[Stage]) -> list[Lack]:
     """Half-widths that were asked for, of states and outputs, and are not met."""
-    rows = dict(zip(loop.model.states, np.eye(loop.states, dtype=int).tolist(), strict=True))
-    rows |= {output.name: list(output.row) for output in loop.spec.outputs}
-    lacks = []
+    states, lacks = loop.model.states, []
+    weights = {name: {name: Fraction(1)} for name in states}
+    weights |= {output.name: dict(zip(states, output.row, strict=True)) for output in loop.spec.outputs}
     for name, wish in loop.spec.tube.half_widths:
-        widths = [
-            sum(
-                abs(factor) * own.half_widths[state]
-                for factor, state in zip(rows[name], loop.model.states, strict=True)
-            )
-            for own in stages
-        ]
-        if (most := max(widths)) > wish:
+        shares = weights[name].items()
+        most = max(sum(abs(share) * own.half_widths[state] for state, share in shares) for own in stages)
+        if most > wish:
             lacks.append(Lack(kind="wish", where=name, needed=float(most), allowed=float(wish)))
     return lacks
 
@@ -361,15 +361,12 @@ def _inputs(loop: Loop, remainders: Remainders, boxes: Boxes) -> tuple[tuple[Inp
     U = boxes.U.max(axis=0) + PLAN_ROUNDING * remainders.inputs_above
     uses, lacks = [], []
     for j, name in enumerate(loop.model.inputs):
-        ends = _outward(number_below(low[j] - number_above(U[j])), number_above(high[j] + number_above(U[j])))
+        reach = number_above(U[j])
+        least, most = number_below(low[j] - reach), number_above(high[j] + reach)
+        ends = Fraction(digits.down(least, _DIGITS)), Fraction(digits.up(most, _DIGITS))
         given = limits.get(name)
         uses.append(InputUse(input=name, range=ends, limits=given))
         if given is not None and not (given[0] <= ends[0] and ends[1] <= given[1]):
-            room = min(float(given[1]) - float(high[j]), float(low[j]) - float(given[0]))
+            room = float(remainders.room[j])
             lacks.append(Lack(kind="inputs", where=name, needed=float(U[j]), allowed=room))
     return tuple(uses), lacks
-
-
-def _outward(low: float, high: float) -> tuple[Fraction, Fraction]:
-    """Decimals beside two floats."""
-    return Fraction(digits.down(low, _DIGITS)), Fraction(digits.up(high, _DIGITS))

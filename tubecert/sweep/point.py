@@ -132,7 +132,7 @@ def _certificate(task: Task, point: Point) -> str:
         return certificate.dump(certificate.seal(result.to_json(), run))
     from tubecert.loop_design.certification import certify
 
-    return sampled.certificate_text(replace(certify(spec, settings=dict(spec.settings)), run=run))
+    return sampled.certificate_text(replace(certify(spec), run=run))
 
 
 def certificate_file(folder: Path, point: Point) -> Path:
