@@ -34,7 +34,7 @@ SIDES = {
     "theorem": ("tubecert.sampled_loop", ("theorem", "responses", "remainders"), ("tests/sampled_loop",)),
     "recheck": (
         "tubecert.recheck.sampled_loop",
-        ("conditions", "rows", "loop", "remainders", "windows", "claims", "exponential", "obstacles"),
+        ("theorem", "loop", "remainders", "windows", "claims", "obstacles"),
         ("tests/recheck/sampled_loop",),
     ),
 }

@@ -39,7 +39,11 @@ class Case:
     def curve(self) -> Curve:
         """The plan."""
         with ctx.workprec(SHARP):
-            return curve_of(self.result.specification, self.result.plan, self.system)
+            s, trajectory = self.system, self.result.specification.trajectory
+            drift = [row[0] for row in s.drift]
+            return curve_of(
+                trajectory, self.result.plan, s.states, s.inputs, drift, times=s.time, period=s.period
+            )
 
     @cached_property
     def metric(self) -> MetricSection:

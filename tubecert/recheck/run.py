@@ -115,7 +115,7 @@ def _read(document: Node, budget: int) -> tuple[str, str, tuple[str, ...], Calla
     """What a certificate of either format states, its hash, what is not examined, and its claims."""
     if document.mapping()["format"] == SAMPLED_LOOP:
         own = read_sampled_loop(document)
-        return own.result.verdict, own.stated_hash, NOT_EXAMINED, lambda: sampled_loop.of(own, budget)
+        return own.verdict, own.stated_hash, NOT_EXAMINED, lambda: sampled_loop.of(own, budget)
     certificate = read_certificate(document)
     unread = (*certificate.unread, *_refuted_beside(certificate))
     return certificate.result.verdict, certificate.stated_hash, unread, lambda: _claims(certificate, budget)

@@ -21,7 +21,7 @@ from tubecert.recheck.specified.hardware import Disturbance
 from tubecert.recheck.specified.metric import Metric
 from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.specified.plant import Uncertainty
-from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting
+from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting, Trajectory
 from tubecert.recheck.terms import (
     Matrix,
     Term,
@@ -178,28 +178,29 @@ def system_of(spec: Specification) -> System:
     )
 
 
-def curve_of(spec: Specification, plan: Plan, s: System) -> Curve:
-    """The plan: expressions of the specification, or the knots that the certificate holds."""
-    trajectory = spec.trajectory
+def curve_of(
+    trajectory: Trajectory,
+    plan: Plan,
+    states: Sequence[str],
+    inputs: Sequence[str],
+    drift: Sequence[Term],
+    *,
+    times: CoverRange | None = None,
+    period: Ball | None = None,
+) -> Curve:
+    """The plan: expressions of the specification, or the knots that the certificate holds, with f + B u as `drift`.
+
+    `times` and `period`: of f, where it depends on t.
+    """
     if isinstance(trajectory, AnyPlan):
-        return everyone(trajectory, s.states, s.inputs, s.time)
+        return everyone(trajectory, states, inputs, times)
     if isinstance(trajectory, Resting):
-        return expressed(
-            [number(q) for q in trajectory.at],
-            [number(q) for q in trajectory.input],
-            TIME,
-            trajectory.horizon,
-            s.period,
-        )
+        at, input_ = ([number(q) for q in own] for own in (trajectory.at, trajectory.input))
+        return expressed(at, input_, TIME, trajectory.horizon, period)
     if isinstance(trajectory, Expressed):
         return expressed(trajectory.x, trajectory.u, TIME, trajectory.horizon)
-    return hermite(
-        knots_of(plan, trajectory.between, trajectory.horizon),
-        [row[0] for row in s.drift],
-        s.states,
-        s.inputs,
-        trajectory.horizon,
-    )
+    knots = knots_of(plan, trajectory.between, trajectory.horizon)
+    return hermite(knots, drift, states, inputs, trajectory.horizon)
 
 
 def knots_of(plan: Plan, between: str, horizon: Fraction) -> Knots:

@@ -180,14 +180,14 @@ def examine(document: dict, **options) -> Recheck:
 
 
 def why_not(document: dict) -> list[str]:
-    """The claims that do not hold."""
-    return [name for name, _ in failing(examine(document))]
+    """The claims that do not hold; or the code with which reading ends."""
+    return [code] if (code := code_of(document)) else [name for name, _ in failing(examine(document))]
 
 
 def code_of(document: dict) -> str:
     """Of the error with which reading ends, or nothing."""
     try:
-        examine(document)
+        examine(document, seconds=0, to_first_failure=True)
     except TubecertError as error:
         return error.findings[0].code
     return ""

@@ -6,8 +6,7 @@ In: a document of its format. Out: claims, as of every certificate. Trusted: yes
 |---|---|
 | `record` | the certificate, read into closed types |
 | `windows`, `remainders` | the plan in windows; suprema on the tube |
-| `exponential`, `loop` | e^(A t), and the matrices of the loop |
-| `rows` | rows carried back lag by lag, kernels, sums |
-| `conditions` | the inequalities at every sample |
+| `loop`, `theorem` | the loop over a sample; the inequalities at every sample |
 | `obstacles`, `claims` | what else is claimed; all claims in their order |
+| `held`, `exported` | the plan and the code of a controller in C |
 """

@@ -20,8 +20,9 @@ from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import Node
 from tubecert.recheck.metric import stated
 from tubecert.recheck.sampled_loop.held import HeldPlan, Rows, single
-from tubecert.recheck.sampled_loop.record import Certificate, Proven, Result, read_certificate
+from tubecert.recheck.sampled_loop.record import Certificate, Proven, read_certificate
 from tubecert.recheck.sampled_loop.windows import course_of
+from tubecert.recheck.specification import SampledSpecification
 
 _SHIPPED: Final = Path(__file__).parents[2] / "controller"
 _DATA, _README = "controller_data.h", "README.txt"
@@ -51,12 +52,15 @@ def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, 
     yield "controller: the runtime is that of tubecert", stated(not why, why)
     if why:
         return
-    result, texts = certificate.result, document.value["result"]["spec"]["effective"]["trajectory"]
+    spec, proven = certificate.specification, certificate.proven
+    texts = document.value["result"]["spec"]["effective"]["trajectory"]
     try:
-        held = HeldPlan(course_of(result.specification, result.plan), texts.get("x", ()), texts.get("u", ()))
+        if proven is None:
+            raise ValueError("nothing is certified")
+        held = HeldPlan(course_of(spec, proven.plan), texts.get("x", ()), texts.get("u", ()))
         found = _PLAN.search(files[_DATA].decode("ascii"))
         xs, us = map(_rows, found.groups() if found else ())
-        same = files[_DATA] == _marked(_data(certificate, held, xs, us).encode())
+        same = files[_DATA] == _marked(_data(certificate, proven, held, xs, us).encode())
         why = held.wrong(xs, us) if same else f"{_DATA} is not what tubecert writes for it"
     except (ValueError, OverflowError, KeyError) as error:
         same, why = False, f"{_DATA} is not as tubecert writes it ({error})"
@@ -88,17 +92,14 @@ def _rows(text: str) -> Rows:
     return [[single(float.fromhex(word)) for word in row.split(", ")] for row in rows]
 
 
-def _data(certificate: Certificate, held: HeldPlan, xs: Rows, us: Rows) -> str:
-    """The text of the data, with the plan that was found; raises `ValueError` where nothing is certified."""
-    result, proven = certificate.result, certificate.result.proven
-    if result.verdict != "certified" or proven is None:
-        raise ValueError("the certificate is not certified")
-    machine, plant = result.specification.hardware, result.specification.plant
+def _data(certificate: Certificate, proven: Proven, held: HeldPlan, xs: Rows, us: Rows) -> str:
+    """The text of the data, with the plan that was found."""
+    machine, plant = certificate.specification.hardware, certificate.specification.plant
     matrices = {name: [list(map(float, row)) for row in getattr(proven, name).tolist()] for name in "FGMN"}
     matrices |= {"xs": xs, "us": us}
     places: dict[str, object] = {
         **{name: "{" + ",\n".join(map(_array, rows or [[]])) + "}" for name, rows in matrices.items()},
-        **{name: _array(own) for name, own in _limits(result, proven).items()},
+        **{name: _array(own) for name, own in _limits(certificate.specification, proven).items()},
         **{"n": len(plant.states), "m": len(plant.inputs), "z": proven.F.nrows()},
         **{"period": float(machine.sample_time), "delay": float(machine.delay), "lead": float(held.lead)},
         **{"kind": held.kind, "steps": held.steps, "after": held.after, "hash": certificate.hash},
@@ -108,17 +109,17 @@ def _data(certificate: Certificate, held: HeldPlan, xs: Rows, us: Rows) -> str:
     return Template((_SHIPPED / f"{_DATA}.in").read_text("utf-8")).substitute(places)
 
 
-def _limits(result: Result, proven: Proven) -> dict[str, list[float]]:
+def _limits(spec: SampledSpecification, proven: Proven) -> dict[str, list[float]]:
     """The last numbers of the arithmetic within what is proven, and the first reach that is enough."""
-    machine, boxes, stages = result.specification.hardware, result.specification.plant.safe_set, proven.stages
+    machine, boxes, stages = spec.hardware, spec.plant.safe_set, proven.stages
     noise = machine.noise if isinstance(machine.noise, tuple) else (machine.noise,) * len(boxes)
     widths = zip(*(own.half_widths for own in stages), strict=True)
     off = [(max(w) + v, max(map(abs, box))) for w, v, box in zip(widths, noise, boxes.values(), strict=True)]
     limits = {
         "reach": (1, [far + _ROUNDING * (far + size) for far, size in off]),
         "memory": (-1, [max(own) for own in zip(*(stage.memory for stage in stages), strict=True)]),
-        "low": (1, [use.range[0] for use in result.inputs]),
-        "high": (-1, [use.range[1] for use in result.inputs]),
+        "low": (1, [low for low, _ in proven.ranges]),
+        "high": (-1, [high for _, high in proven.ranges]),
     }
     return {name: [_next(q, side, machine.arithmetic) for q in own] for name, (side, own) in limits.items()}
 

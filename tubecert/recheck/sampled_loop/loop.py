@@ -1,19 +1,65 @@
-"""The linear sampled loop of an error equation, enclosed: its matrices over one sample, and at times within one.
+"""The linear sampled loop of an error equation, enclosed: e^(A t), and the loop over one sample, and within one.
 
 xi = (e, zeta, v_1..v_b, eta): the error, the controller's memory, the deltas of the b samples before (which the delay
-keeps waiting), the slow signals. Rows are those of (xi_k, w_k): w_k is what noise and rounding add to delta_k at once.
-Implements: theory of the sampled loop, section 3.
+keeps waiting), the slow signals. What is heard at a sample stands beside it: noise and rounding of dy, then rounding
+of u and of zeta. Rows are those of (xi_k, heard_k). Implements: theory of the sampled loop, sections 2 and 3.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
+from itertools import accumulate, pairwise
 
-from flint import arb_mat
+from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, exact
-from tubecert.recheck.sampled_loop.exponential import flow, identity, joined, zeros
+
+
+def picked(rows: range, size: int) -> arb_mat:
+    """Rows of the unit matrix of a size."""
+    return arb_mat(len(rows), size, [int(i == j) for i in rows for j in range(size)])
+
+
+def column(entries: Sequence[Ball]) -> arb_mat:
+    """A matrix of one column."""
+    return arb_mat(len(entries), 1, list(entries))
+
+
+def joined(blocks: Sequence[Sequence[arb_mat]]) -> arb_mat:
+    """A matrix of blocks: those of one row are equally high, those of one column equally wide."""
+    width = sum(block.ncols() for block in blocks[0])
+    flat: list[arb] = []
+    for row in blocks:
+        tables: list[list[list[arb]]] = [block.tolist() for block in row]
+        for lines in zip(*tables, strict=True):
+            flat += [x for line in lines for x in line]
+    return arb_mat(sum(row[0].nrows() for row in blocks), width, flat)
+
+
+def parted(a: arb_mat, at: int) -> tuple[arb_mat, arb_mat]:
+    """The columns before one, and the others."""
+    left, right = ([x for row in a.tolist() for x in row[part]] for part in (slice(at), slice(at, None)))
+    return arb_mat(a.nrows(), at, left), arb_mat(a.nrows(), a.ncols() - at, right)
+
+
+def sizes(a: arb_mat) -> arb_mat:
+    """The entries' largest magnitudes."""
+    return arb_mat(a.nrows(), a.ncols(), [x.abs_upper() for x in a.entries()])
+
+
+def around_zero(a: arb_mat) -> arb_mat:
+    """Balls around 0 as large as the entries: r times such a column is a ball around 0 as large as |r| times it."""
+    return arb_mat(a.nrows(), a.ncols(), [arb(0, x.abs_upper()) for x in a.entries()])
+
+
+def flow(A: arb_mat, t: Ball) -> tuple[arb_mat, arb_mat]:
+    """e^(A t) and int_0^t e^(A s) ds, both (n, n), for every t of the ball: e^[[A t, I t], [0, 0]] holds both."""
+    n = A.nrows()
+    whole = joined([[A * t, picked(range(n), n) * t], [arb_mat(n, 2 * n)]]).exp().tolist()
+    return parted(arb_mat(whole[:n]), n)
 
 
 @dataclass(frozen=True)
@@ -31,18 +77,6 @@ class Loop:
     delay: Fraction
 
     @property
-    def shape(self) -> tuple[int, int, int, int, int]:
-        """n, m, z, b, r: states, inputs, memory of the controller, earlier samples that act or wait, slow signals."""
-        n, m, z, r = self.A.nrows(), self.B.ncols(), self.F.nrows(), self.H.ncols()
-        return n, m, z, self.whole + (self.rest > 0), r
-
-    @property
-    def width(self) -> int:
-        """Entries of xi."""
-        n, m, z, b, r = self.shape
-        return n + z + b * m + r
-
-    @property
     def whole(self) -> int:
         """Q: whole samples of delay."""
         return int(self.delay // self.sample)
@@ -52,66 +86,49 @@ class Loop:
         """tau': what is left of the delay."""
         return self.delay - self.whole * self.sample
 
+    @property
+    def waiting(self) -> int:
+        """b: of how many earlier samples a delta acts or waits."""
+        return self.whole + (self.rest > 0)
+
     def nodes(self, pieces: int) -> list[Fraction]:
         """Times of a sample between which nothing jumps: `pieces` equal parts, and tau'."""
         return sorted({self.sample * Fraction(a, pieces) for a in range(pieces + 1)} | {self.rest})
 
-    # -- within a sample: rows of e(t_k + s), without what acts on it from t_k on; `later`: s is not before tau'
+    @cached_property
+    def parts(self) -> list[arb_mat]:
+        """Rows that pick e (n), zeta (z), v_1..v_b (m each), eta (r); what is heard of dy (n), u (m), zeta (z)."""
+        n, m, z = self.A.nrows(), self.B.ncols(), self.F.nrows()
+        ends = [0, *accumulate([n, z, *[m] * self.waiting, self.H.ncols(), n, m, z])]
+        return [picked(range(a, b), ends[-1]) for a, b in pairwise(ends)]
+
+    @property
+    def width(self) -> int:
+        """Entries of xi."""
+        return sum(own.nrows() for own in self.parts[:-3])
+
+    @cached_property
+    def sent(self) -> list[arb_mat]:
+        """Rows of delta_k, v_1, .., v_b, (m, ..) each."""
+        e, zeta, *waiting, _, heard, rounded, _ = self.parts
+        return [self.N * (e + heard) + self.M * zeta + rounded, *waiting]
 
     def error(self, s: Ball, *, later: bool) -> arb_mat:
-        """The rows, (n, width + m)."""
+        """Rows of e(t_k + s), (n, ..), but for what acts on it from t_k on; `later`: s is not before tau'."""
         own, steady = flow(self.A, s)
         now = flow(self.A, s - exact(self.rest))[1] * self.B if later else 0 * self.B
-        return self._rows(own, steady * self.B - now, now, steady * self.H)
+        inputs = (steady * self.B - now) * self.sent[-1] + now * self.sent[self.whole]
+        return own * self.parts[0] + inputs + steady * self.H * self.parts[-4]
 
     def error_rate(self, s: Ball, *, later: bool) -> arb_mat:
         """Their derivatives by s."""
-        now = self.B if later else 0 * self.B
-        return self.A * self.error(s, later=later) + self._rows(0 * self.A, self.B - now, now, self.H)
-
-    def _rows(self, own: arb_mat, before: arb_mat, now: arb_mat, steady: arb_mat) -> arb_mat:
-        """Of e, of what acts before and after tau' at its place, of eta."""
-        n, m, _, b, _ = self.shape
-        waiting = [zeros(n, m)] * b
-        if self.rest:
-            waiting[self.whole] = before
-        if self.whole:
-            waiting[self.whole - 1], now = now, zeros(n, m)
-        return joined([[own + now * self.N, now * self.M, *waiting, steady, now]])
-
-    # -- from sample to sample
-
-    @property
-    def delta(self) -> arb_mat:
-        """The rows of delta_k, (m, width + m)."""
-        _, m, _, b, r = self.shape
-        return joined([[self.N, self.M, zeros(m, b * m + r), identity(m)]])
-
-    @property
-    def memory(self) -> arb_mat:
-        """The rows of zeta at its own sample, (z, width + m)."""
-        n, m, z, b, r = self.shape
-        return joined([[zeros(z, n), identity(z), zeros(z, b * m + r + m)]])
+        inputs = self.B * self.sent[self.whole if later else -1]
+        return self.A * self.error(s, later=later) + inputs + self.H * self.parts[-4]
 
     @property
     def step(self) -> arb_mat:
-        """Those of xi_(k+1), (width, width + m): AA, and what w_k does."""
-        n, m, z, b, r = self.shape
-        moved = [self.G, self.F, zeros(z, b * m + r + m)]
-        kept = max(b - 1, 0) * m  # v_i becomes v_(i+1)
-        waiting = [zeros(kept, n + z), identity(kept), zeros(kept, m + r + m)]
-        slow = [zeros(r, n + z + b * m), identity(r), zeros(r, m)]
-        sent = [[self.delta]] if b else []
-        return joined([[self.error(exact(self.sample), later=True)], moved, *sent, waiting, slow])
-
-    def shaken(self, heard: arb_mat) -> arb_mat:
-        """What rounding of dy_k (n), of u_k (m), of zeta_(k+1) (z), and noise (n) do through columns at w_k."""
-        seen = heard * self.N
-        return joined([[seen, heard, zeros(heard.nrows(), self.shape[2]), seen]])
-
-    def arriving(self, heard: arb_mat) -> arb_mat:
-        """What they do to xi_(k+1), (width, n + m + z + n); `heard`: the columns of `step` at w_k."""
-        n, m, z, _, _ = self.shape
-        every = n + m + z + n
-        stored = joined([[self.G, zeros(z, m), identity(z), self.G]])
-        return self.shaken(heard) + joined([[zeros(n, every)], [stored], [zeros(self.width - n - z, every)]])
+        """Those of xi_(k+1), (width, ..): AA, and NN."""
+        e, zeta, *_, eta, heard, _, rounded = self.parts
+        kept = self.G * (e + heard) + self.F * zeta + rounded
+        moved = [self.error(exact(self.sample), later=True), kept, *self.sent[:-1], eta]
+        return joined([[own] for own in moved])

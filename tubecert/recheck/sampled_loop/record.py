@@ -1,17 +1,15 @@
 """A certificate of a sampled loop, read into closed types: every object with the keys that it must and may have.
 
 A key that is missing, unknown or of another kind is an error (TC603). Numbers are exact: decimals, or hexadecimal
-floats in the one spelling that they have. What explains, `notes` and `run`, is not read.
+floats in the one spelling that they have. What explains, `notes` and `run`, is not read; of a result that is not
+certified only the specification and what repeats it are.
 """
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeVar
 
 from flint import arb, arb_mat
 
@@ -23,13 +21,11 @@ from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.specified.trajectory import Planned, Tabled
 
 NOT_EXAMINED = ("notes", "run", "spec.file_hash")
-VERDICTS = ("certified", "refuted", "undecided")
-_HEX = re.compile(r"-?0x[01]\.[0-9a-f]{1,13}p[+-][0-9]{1,4}")
+_PARTS = ("nominal", "controller", "tube", "recipe", "inputs")  # of a certified result
 _MOST_LAGS = 50_000
 _MOST_START = 1_000_000  # samples before the last stage
 _MOST_STAGES = _MOST_MEMORY = _MOST_PARTS = 64
 _MOST_WINDOWS = 4_096
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +45,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """How the proof was found: a hint. `cuts` (n + m + z rows) of r lags."""
+    """How the proof was found: a hint. `cuts` (n + m + z rows) of r lags; whether parameters are `slow`."""
 
     lags: int
     cuts: tuple[tuple[int, ...], ...]
@@ -59,18 +55,16 @@ class Recipe:
     slow: bool
 
 
-@dataclass(frozen=True, slots=True)
-class InputUse:
-    """An input by name: what it keeps to, and its limits."""
-
-    name: str
-    range: Range
-    limits: Range | None
+Repeated = dict[str, tuple[object, object]]
+"""By path what is stated a second time, and what it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Proven:
-    """What a certified result rests on: A (n, n), B (n, m), E (n, k); tables F (z, z), G (z, n), M (m, z), N (m, n)."""
+    """What a certified result rests on: A (n, n), B (n, m), E (n, k); tables F (z, z), G (z, n), M (m, z), N (m, n).
+
+    `ranges`: what each input keeps to. `cleared`: from which obstacles the tube keeps away.
+    """
 
     A: arb_mat
     B: arb_mat
@@ -81,92 +75,66 @@ class Proven:
     N: arb_mat
     stages: tuple[Stage, ...]
     recipe: Recipe
-
-
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What is claimed; `proven` is there where the verdict is certified.
-
-    `repeated`: by path what is stated a second time, and what it is.
-    """
-
-    verdict: str
-    specification: SampledSpecification
-    repeated: dict[str, tuple[object, object]]
     plan: Plan
-    proven: Proven | None
-    inputs: tuple[InputUse, ...]
-    clearance: tuple[tuple[int, str], ...]
-    lacks: int
+    ranges: tuple[Range, ...]
+    cleared: tuple[bool, ...]
+    repeated: Repeated
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """The result with the hash that is stated and the one that it has."""
+    """What is claimed, and `proven` where it is certified; the hash that is stated, and the one that it has."""
 
-    result: Result
+    verdict: str
+    specification: SampledSpecification
+    proven: Proven | None
+    repeated: Repeated
     stated_hash: str
     hash: str
 
 
 def read_certificate(document: Node) -> Certificate:
     """The certificate in a document; raises `CertificateError` for whatever is not of its form."""
-    own = document.closed("format", "hash", "result", "notes", "run")
+    whole = document.closed("format", "hash", "result", "notes", "run")
     for key in ("notes", "run"):
-        own[key].mapping()
-    return Certificate(read_result(own["result"]), own["hash"].text(), digest(own["result"].value))
-
-
-def read_result(node: Node) -> Result:
-    """`result`."""
-    parts = ("nominal", "controller", "tube", "recipe")
-    own = node.closed(
-        "verdict", "spec", "claim", optional=("planned", *parts, "inputs", "clearance", "lacks")
+        whole[key].mapping()
+    certified = whole["result"].mapping().get("verdict") == "certified"
+    optional = ("planned", "clearance") if certified else ("planned", "clearance", "lacks", *_PARTS)
+    own = whole["result"].closed(
+        "verdict", "spec", "claim", *(_PARTS if certified else ()), optional=optional
     )
-    spec = own["spec"].closed("effective", "effective_hash", "file_hash", optional=("settings",))
-    spec["file_hash"].text()
-    specification = read_sampled_specification(spec["effective"])
-    if own["verdict"].word(*VERDICTS) == "certified":
-        own.require(*parts)
-    settings = spec.get("settings", lambda item: read_settings(item, spec["effective"])) or {}
-    return Result(
-        verdict=own["verdict"].text(),
-        specification=specification,
-        repeated={
-            "spec.effective_hash": (spec["effective_hash"].text(), specification.hash),
-            **{f"spec.settings.{path}": pair for path, pair in settings.items()},
-            **_claim(own["claim"], specification),
-        },
-        plan=_plan(own, specification),
-        proven=_proven(own, specification) if all(part in own for part in parts) else None,
-        inputs=_each(own, "inputs", _input),
-        clearance=_each(own, "clearance", _cleared),
-        lacks=len(_each(own, "lacks", _lack)),
-    )
-
-
-def _each(own: Members, key: str, reads: Callable[[Node], T]) -> tuple[T, ...]:
-    return tuple(map(reads, own[key].entries())) if key in own else ()
-
-
-def _claim(node: Node, spec: SampledSpecification) -> dict[str, tuple[object, object]]:
-    own = node.closed("horizon", "afterwards", "hold")
+    source = own["spec"].closed("effective", "effective_hash", "file_hash", optional=("settings",))
+    source["file_hash"].text()
+    spec = read_sampled_specification(source["effective"])
+    settings = source.get("settings", lambda item: read_settings(item, source["effective"])) or {}
+    claim = own["claim"].closed("horizon", "afterwards", "hold")
     horizon = spec.trajectory.horizon if spec.afterwards == "nothing" else None
-    return {
-        "claim.horizon": (own.known("horizon", Node.decimal), horizon),
-        "claim.afterwards": (own["afterwards"].word("nothing", "rest", "repeat"), spec.afterwards),
-        "claim.hold": (own["hold"].word("middle", "left", "continuous"), spec.hardware.hold),
+    repeated: Repeated = {
+        "spec.effective_hash": (source["effective_hash"].text(), spec.hash),
+        **{f"spec.settings.{path}": pair for path, pair in settings.items()},
+        "claim.horizon": (claim.known("horizon", Node.decimal), horizon),
+        "claim.afterwards": (claim["afterwards"].text(), spec.afterwards),
+        "claim.hold": (claim["hold"].text(), spec.hardware.hold),
     }
+    return Certificate(
+        verdict=own["verdict"].word("certified", "refuted", "undecided"),
+        specification=spec,
+        proven=_proven(own, spec) if certified else None,
+        repeated=repeated,
+        stated_hash=whole["hash"].text(),
+        hash=digest(whole["result"].value),
+    )
 
 
 def _proven(own: Members, spec: SampledSpecification) -> Proven:
-    n, m = len(spec.plant.states), len(spec.plant.inputs)
-    k = 0 if spec.disturbance is None else len(spec.disturbance.E[0])
-    nominal = own["nominal"].closed("A", "B", "E")
-    tables = own["controller"].closed("F", "G", "M", "N")
-    z = len(tables["F"].closed("columns", "rows")["rows"].entries())
-    if z > _MOST_MEMORY:
-        raise tables["F"].refused(f"has more than {_MOST_MEMORY} rows")
+    states, inputs = spec.plant.states, spec.plant.inputs
+    n, m, k = len(states), len(inputs), 0 if spec.disturbance is None else len(spec.disturbance.E[0])
+    nominal, tables = own["nominal"].closed("A", "B", "E"), own["controller"].closed("F", "G", "M", "N")
+    z = _between(tables["F"].closed("columns", "rows")["columns"], 0, _MOST_MEMORY)
+    uses = [item.closed("input", "range", optional=("limits",)) for item in own["inputs"].sized(m)]
+    told = [(use["input"].text(), use.get("limits", _ends)) for use in uses]
+    kept = own.get("clearance", lambda item: item.sized(len(spec.obstacles))) or []
+    away = [item.closed("index", "verdict") for item in kept]
     return Proven(
         A=_matrix(nominal["A"], n, n),
         B=_matrix(nominal["B"], n, m),
@@ -177,24 +145,29 @@ def _proven(own: Members, spec: SampledSpecification) -> Proven:
         N=_matrix(tables["N"], m, n),
         stages=_stages(own["tube"], spec, z),
         recipe=_recipe(own["recipe"], n + m + z),
+        plan=_plan(own, spec),
+        ranges=tuple(_ends(use["range"]) for use in uses),
+        cleared=tuple(item["verdict"].word("certified", "undecided") == "certified" for item in away),
+        repeated={
+            "inputs": (told, [(name, spec.limits.get(name)) for name in inputs]),
+            "clearance": ([item["index"].count() for item in away], list(range(len(spec.obstacles)))),
+        },
     )
 
 
 def _matrix(node: Node, p: int, q: int) -> arb_mat:
     own = node.closed("columns", "rows")
-    if own["columns"].count() != q:
-        raise node.refused(f"has not {q} columns")
+    _between(own["columns"], q, q)
     return arb_mat(p, q, [arb(_float(entry)) for row in own["rows"].rows(p, q) for entry in row])
 
 
 def _float(node: Node) -> float:
     """A finite float in the spelling of `float.hex`."""
-    text = node.text()
     try:
-        value = float.fromhex(text) if _HEX.fullmatch(text) else math.nan
-    except OverflowError:
+        value = float.fromhex(node.text())
+    except (ValueError, OverflowError):
         value = math.nan
-    if not math.isfinite(value) or value.hex() != text:
+    if not math.isfinite(value) or value.hex() != node.value:
         raise node.refused("is no finite hexadecimal number in its own spelling")
     return value
 
@@ -219,7 +192,7 @@ def _stage(node: Node, spec: SampledSpecification, z: int) -> Stage:
         tuple(deviations[name].decimal() for name in spec.plant.inputs),
         tuple(item.decimal() for item in own["memory"].sized(z)),
     )
-    if min(found.half_widths) <= 0 or min((*found.deviations, *found.memory)) < 0:
+    if min(found.half_widths) <= 0 or min(found.boxes) < 0:
         raise node.refused("has a box without an inside")
     return found
 
@@ -247,35 +220,15 @@ def _between(node: Node, least: int, most: int) -> int:
 def _plan(own: Members, spec: SampledSpecification) -> Plan:
     """The knots of a plan through knots, which no other plan may have."""
     kind, plant = spec.trajectory.kind, spec.plant
-    if "planned" not in own:
-        return Plan(kind, None, None, None, None, None)
     if not isinstance(spec.trajectory, (Planned, Tabled)):
-        raise own["planned"].refused("is not known in this place")
+        if "planned" in own:
+            raise own["planned"].refused("is not known in this place")
+        return Plan(kind, None, None, None, None, None)
     part = own["planned"].closed("t", "x", "u", "interpolation")
     knots = read_knots(part, len(plant.states), len(plant.inputs), Node.decimal)
-    return Plan(
-        kind, part["interpolation"].word("hold", "linear", "hermite-simpson"), None, knots, None, None
-    )
-
-
-def _input(node: Node) -> InputUse:
-    own = node.closed("input", "range", optional=("limits",))
-    return InputUse(own["input"].text(), _ends(own["range"]), own.get("limits", _ends))
+    return Plan(kind, part["interpolation"].text(), None, knots, None, None)
 
 
 def _ends(node: Node) -> Range:
     low, high = node.pair()
     return low.decimal(), high.decimal()
-
-
-def _cleared(node: Node) -> tuple[int, str]:
-    own = node.closed("index", "verdict")
-    return own["index"].count(), own["verdict"].word(*VERDICTS)
-
-
-def _lack(node: Node) -> None:
-    own = node.closed("kind", optional=("where", "needed", "allowed"))
-    own["kind"].text()
-    own.get("where", Node.text)
-    for key in ("needed", "allowed"):
-        own.get(key, Node.number)

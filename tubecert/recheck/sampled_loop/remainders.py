@@ -16,7 +16,7 @@ from flint import arb, arb_mat
 from tubecert.recheck.balls import Ball, between, exact, length
 from tubecert.recheck.program import Program
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.sampled_loop.exponential import column, identity, joined, parted, sizes
+from tubecert.recheck.sampled_loop.loop import column, joined, parted, picked, sizes
 from tubecert.recheck.sampled_loop.windows import Course, Window, driven, tops
 from tubecert.recheck.terms import NOUGHT, Term, names, slopes
 from tubecert.recheck.times import common_period
@@ -61,7 +61,7 @@ class Remainders:
     """The suprema of one plan with the matrices A (n, n), B (n, m), E (n, k) of the error equation.
 
     Along the plan, in its `windows`: sup |x*_i| (n), sup |u*_j| (m); `held`: sup |u*_j - ubar_j| while a command acts
-    (m), with what a computer misses u* by.
+    (m), with what a computer misses u* by. Raises `ValueError` where parameters are `slow`, and u* jumps.
     """
 
     def __init__(
@@ -73,17 +73,19 @@ class Remainders:
         plant, wind, h = self._spec.plant, self._spec.disturbance, self._spec.uncertainty
         self._names = (*course.names, *plant.ranges)
         self._parameters = [between(exact(a), exact(b)) for a, b in plant.ranges.values()]
-        self._field = driven(plant.unknown or plant.f, plant.gained or plant.B, plant.inputs)
+        field = driven(plant.unknown or plant.f, plant.gained or plant.B, plant.inputs)
         blown = () if wind is None else (e for row in wind.E for e in row)
-        self._slopes = Program([*_gradients(self._field, course.names), *blown], self._names)
-        strange = enumerate(f - known for f, known in zip(self._field, course.F, strict=True))
+        self._slopes = Program([*_gradients(field, course.names), *blown], self._names)
+        strange = enumerate(f - known for f, known in zip(field, course.F, strict=True))
         self._strange = {i: e for i, e in strange if not names([e]).isdisjoint(plant.ranges)}  # 0 at p0
-        self._h, timed = h.h or (), (*plant.states, TIME)
-        self._sizes_of_h = Program(self._h, timed)
-        self._slopes_of_h = Program(_gradients(self._h, timed), timed)
-        # whether nothing bounds how fast h changes; else the inputs beside which it acts
-        self._jumps = h.h is None and not {"h_x", "h_t"} <= h.declared.keys()
-        own = [] if self._jumps else range(self._m)
+        if slow and self._strange and not course.smooth:
+            raise ValueError("u* jumps, so that parameters are not slow")
+        timed = (*plant.states, TIME)
+        self._h, self._slopes_of_h = (
+            Program(own, timed) for own in (h.h or (), _gradients(h.h or (), timed))
+        )
+        self._sudden = h.h is None and not {"h_x", "h_t"} <= h.declared.keys()
+        own = [] if self._sudden else range(self._m)
         self._matched = [j for j in own if h.h is None or h.h[j] is not NOUGHT]
         self._gusts = Size([], length=False) if wind is None else Size.of(wind.bound, self._E.ncols())
         self.windows = course.windows(windows)
@@ -92,31 +94,25 @@ class Remainders:
         jumps = zip(course.held(self.windows), self.inputs_above, strict=True)
         self.held = [x + exact(PLAN) * above for x, above in jumps]
 
-    @cached_property
-    def _defect(self) -> list[Ball]:
-        """sup |x*_i' - F_i(x*, u*, p0)|, (n,)."""
-        return self._course.defect()
-
     # -- signals
 
     def sudden(self) -> list[tuple[arb_mat, Size]]:
-        """What may jump: columns (n, k) and its size."""
-        wind, found = self._spec.disturbance, []
-        if wind is not None and wind.rate is None:
-            found.append((self._E, self._gusts))
-        if self._jumps:
+        """What may jump, a wind or h: columns (n, k) and its size."""
+        wind = self._spec.disturbance
+        found = [] if wind is None or wind.rate is not None else [(self._E, self._gusts)]
+        if self._sudden:
             found.append((self._B, Size.of(self._spec.uncertainty.declared["h"], self._m)))
         return found
 
     def slow(self, W: Sequence[Ball]) -> list[Slow]:
         """The components of eta, of which h is met where |e| <= W: h, a wind with a rate, parameters."""
-        found = [] if self._jumps else self._uncertain(W)
+        found = [] if self._sudden else self._uncertain(W)
         wind = self._spec.disturbance
         if wind is not None and wind.rate is not None:
             own, rate = zip(_columns(self._E), self._gusts.each, strict=True), exact(wind.rate)
             found += [Slow(e, size, rate, size) for e, size in own]
         if self._slow:
-            units = _columns(identity(self._n))
+            units = _columns(picked(range(self._n), self._n))
             found += [Slow(units[i], size, rate, size) for i, (size, rate) in self._strangeness.items()]
         return found
 
@@ -124,20 +120,16 @@ class Remainders:
         given, columns = self._spec.uncertainty, _columns(self._B)
         if given.h is None:
             size, steep, fast = (exact(given.declared[key]) for key in ("h", "h_x", "h_t"))
-            speed = tops([length([x.abs_upper() for x in own.speed])] for own in self.windows)
-            return [Slow(own, size, fast + steep * speed[0], size) for own in columns]
+            (speed,) = tops([length([x.abs_upper() for x in own.speed])] for own in self.windows)
+            return [Slow(own, size, fast + steep * speed, size) for own in columns]
         start = [own.x for own in self.windows] if self._course.family else [self._course.curve.somewhere()]
-        found = (
-            tops(self._sizes_of_h.run([*_wider(own.x, W), time]) for own, time in self._timed),
-            tops(
-                (self._steep(own.x, time) * column([*own.speed, arb(1)])).entries()
-                for own, time in self._timed
-            ),
-            tops(self._sizes_of_h.run([*x, arb(0)]) for x in start),
-        )
-        return [Slow(columns[j], *(own[j] for own in found)) for j in self._matched]
+        sizes_ = tops(self._h.run([*_wider(own.x, W), time]) for own, time in self._timed)
+        first = tops(self._h.run([*x, arb(0)]) for x in start)
+        moved = ((self._along_h(own.x, time), [*own.speed, arb(1)]) for own, time in self._timed)
+        rates = tops((slope * column(speed)).entries() for slope, speed in moved)
+        return [Slow(columns[j], sizes_[j], rates[j], first[j]) for j in self._matched]
 
-    def _steep(self, x: Sequence[Ball], time: Ball) -> arb_mat:
+    def _along_h(self, x: Sequence[Ball], time: Ball) -> arb_mat:
         """Slopes of h by states, then by t, (m, n + 1)."""
         return arb_mat(self._m, self._n + 1, self._slopes_of_h.run([*x, time]))
 
@@ -147,26 +139,19 @@ class Remainders:
 
         Where the plan's own time is not that of h these are parts of a period, or of all of it.
         """
-        parts, horizon = [arb(0)], self._course.horizon
-        if TIME in names(self._h):
-            whole = exact(horizon) if horizon is not None else common_period(self._h).ball
+        h, parts, horizon = self._spec.uncertainty.h or (), [arb(0)], self._course.horizon
+        if TIME in names(h):
+            whole = exact(horizon) if horizon is not None else common_period(h).ball
             parts = [whole * between(arb(k) / _PARTS, arb(k + 1) / _PARTS) for k in range(_PARTS)]
         anywhere = [own for own in self.windows if own.time is None]
-        if names(self._h).isdisjoint(self._spec.plant.states):
+        if names(h).isdisjoint(self._spec.plant.states):
             anywhere = anywhere[:1]
         found = [(own, own.time) for own in self.windows if own.time is not None]
         return [*found, *((own, time) for own in anywhere for time in parts)]
 
-    # -- parameters
-
-    @property
-    def has_rates(self) -> bool:
-        """Whether what parameters do along the plan has a rate, if it is taken for slow."""
-        return not (self._slow and self._strange) or self._course.smooth
-
     @cached_property
     def _strangeness(self) -> dict[int, tuple[Ball, Ball]]:
-        """Of these rows along the plan: how large, and how fast; what is 0 at p0 is bounded by its slopes in p."""
+        """What parameters do along the plan, by row: how large, and how fast; 0 at p0, so bounded by slopes in p."""
         rows, moving = list(self._strange.values()), self._course.names
         own = [*rows, *_gradients(rows, moving)]
         program = Program([*rows, *_gradients(own, tuple(self._spec.plant.ranges))], self._names)
@@ -186,21 +171,21 @@ class Remainders:
 
     def rho(self, W: Sequence[Ball], U: Sequence[Ball], slow: Sequence[Slow]) -> list[Ball]:
         """sup |rho| where |e| <= W, |delta| <= U: through the unit matrix (n), and the columns of B (m)."""
-        acting = [exact(self._spec.uncertainty.declared["h"]) if self._jumps else arb(0)] * self._m
+        acting = [exact(self._spec.uncertainty.declared["h"]) if self._sudden else arb(0)] * self._m
         for j, eta in zip(self._matched, slow, strict=False):
             acting[j] = eta.size
         bent = tops(self._off(own, W, U, acting) for own in self.windows)
-        found = [x + y for x, y in zip(bent, self._defect, strict=True)]
+        missed = tops(own.missed for own in self.windows)
         if not self._slow:
             for i, (size, _) in self._strangeness.items():
-                found[i] += size
-        return [*found, *(x + y for x, y in zip(self.held, self._along_h(W), strict=True))]
+                missed[i] += size
+        return [*map(arb.__add__, bent, missed), *map(arb.__add__, self.held, self._steep(W))]
 
     def _off(self, own: Window, W: Sequence[Ball], U: Sequence[Ball], acting: Sequence[Ball]) -> list[Ball]:
         """What a window has of the remainder without the defect, (n,)."""
         n, m, k = self._n, self._m, self._E.ncols()
         nominal = joined([[self._A, self._B]])
-        weights = column([*W, *(x + y for x, y in zip(U, self.held, strict=True))])
+        weights = column([*W, *map(arb.__add__, U, self.held)])
         total, off, values = arb_mat(n, 1), nominal, []
         for step in range(1, _STEPS + 1):
             share = arb(step) / _STEPS
@@ -213,17 +198,15 @@ class Remainders:
         shaken = (arb_mat(n, k, values[n * (n + m) :]) - self._E).tolist()
         return [x + self._gusts.through(row) for x, row in zip(total.entries(), shaken, strict=True)]
 
-    def _along_h(self, W: Sequence[Ball]) -> list[Ball]:
+    def _steep(self, W: Sequence[Ball]) -> list[Ball]:
         """sup |h_j(t, x* + e) - h_j(t, x*)|, (m,)."""
         given = self._spec.uncertainty
-        if self._jumps:
-            return [arb(0)] * self._m
         if given.h is None:
-            return [exact(given.declared["h_x"]) * length(W)] * self._m
+            slope = arb(0) if self._sudden else exact(given.declared["h_x"])
+            return [slope * length(W)] * self._m
         away = column([*W, arb(0)])
-        return tops(
-            (sizes(self._steep(_wider(own.x, W), time)) * away).entries() for own, time in self._timed
-        )
+        near = (self._along_h(_wider(own.x, W), time) for own, time in self._timed)
+        return tops((sizes(own) * away).entries() for own in near)
 
 
 def _gradients(rows: Sequence[Term], by: Sequence[str]) -> list[Term]:

@@ -6,11 +6,11 @@ Implements: theory of the sampled loop, section 1.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, reduce
-from heapq import heapify, heappush, heapreplace
 from itertools import islice, pairwise, product
 from math import ceil
 
@@ -18,39 +18,29 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, between, ceiling, exact, floor
 from tubecert.recheck.boxes import Field
-from tubecert.recheck.curve import CLOCK, Curve, Knots, expressed, hermite
-from tubecert.recheck.family import everyone
+from tubecert.recheck.curve import CLOCK, Curve, Knots
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.plans import Plan
 from tubecert.recheck.program import Program
-from tubecert.recheck.reading import TIME, upright
+from tubecert.recheck.reading import upright
 from tubecert.recheck.specification import SampledSpecification
-from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting
-from tubecert.recheck.system import knots_of
-from tubecert.recheck.terms import (
-    Matrix,
-    Term,
-    names,
-    number,
-    plus,
-    replaced,
-    slopes,
-    times,
-    variable,
-)
+from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Planned, Tabled
+from tubecert.recheck.system import curve_of, knots_of
+from tubecert.recheck.terms import NOUGHT, Matrix, Term, names, plus, replaced, slopes, times, variable
 from tubecert.recheck.times import common_period
 
-_HALVINGS = 500  # for one supremum along a plan
+_FINER = 4  # parts of a window, where it is asked how far it is from a motion of the plant
 
 
 @dataclass(frozen=True)
 class Window:
-    """Boxes of x* (n) and u* (m), of x*' and u*', and when that is; `time` None: at any time."""
+    """Boxes of x* (n) and u* (m), of x*', u*' and x*' - F(x*, u*, p0) (n), and when; `time` None: at any time."""
 
     x: Sequence[Ball]
     u: Sequence[Ball]
     speed: Sequence[Ball]
     steepness: Sequence[Ball]
+    missed: Sequence[Ball]
     time: Ball | None
 
 
@@ -80,40 +70,20 @@ class Course:
             return self.family.input_rate is not None
         return self.knots is None or not self.knots.held
 
-    def lasts(self) -> str:
-        """Why the plan does not go on as it is said to; empty if it does."""
-        horizon = self.spec.trajectory.horizon
+    @property
+    def goes_on(self) -> bool:
+        """Whether a plan that is repeated is one of formulas, of a period that is no longer, or begins as it ends."""
+        horizon, plan, knots = self.spec.trajectory.horizon, self.spec.trajectory, self.knots
         if self.spec.afterwards != "repeat" or horizon is None:
-            return ""
-        if (knots := self.knots) is not None:
+            return True
+        if knots is not None:
             joined = knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
-            whole = (horizon / self.spec.hardware.sample_time).denominator == 1 and knots.t[-1] == horizon
-            return "" if joined and whole else "its ends differ, or its horizon is no whole number of samples"
-        if not isinstance(plan := self.spec.trajectory, Expressed):
-            return ""
-        period = common_period([*plan.x, *plan.u]).ball
-        return "" if period <= exact(horizon) else "its period is longer than its horizon"
+            return joined and horizon % self.spec.hardware.sample_time == 0 and knots.t[-1] == horizon
+        return not isinstance(plan, Expressed) or bool(
+            common_period([*plan.x, *plan.u]).ball <= exact(horizon)
+        )
 
     # -- windows
-
-    def windows(self, count: int) -> list[Window]:
-        """About so many windows, or cells, that cover it."""
-        if self.family is not None:
-            return list(self._cells(self.family, count))
-        found = list(self._along(count))
-        if self.spec.afterwards == "rest":  # where it is then, without moving
-            (x, u), n = self._end, len(self.curve.x)
-            still = [arb(0)] * (n + len(u))
-            found.append(Window(x, u, still[:n], still[n:], None))
-        return found
-
-    @property
-    def _end(self) -> tuple[list[Ball], list[Ball]]:
-        """x* and u* at the end, of inputs that jump there those before."""
-        last, n = self.curve.parts[-1], len(self.curve.x)
-        field = self.curve.field.with_values(last.values)
-        found = field.at([last.length] if field.variables else [])
-        return found[:n], found[n:]
 
     @cached_property
     def F(self) -> list[Term]:
@@ -125,20 +95,38 @@ class Course:
         """Of states and inputs."""
         return (*self.spec.plant.states, *self.spec.plant.inputs)
 
+    def windows(self, count: int) -> list[Window]:
+        """About so many windows, or cells, that cover it."""
+        if self.family is not None:
+            return list(self._cells(self.family, count))
+        found = list(self._along(count))
+        if self.spec.afterwards == "rest":  # without moving; where inputs jump at the end they stay as before
+            last, n = self.curve.parts[-1], len(self.curve.x)
+            field = self.curve.field.with_values(last.values)
+            own = field.at([last.length] if field.variables else [])
+            still = [arb(0)] * len(own)
+            missed = Program(self.F, self.names).run(own)
+            found.append(Window(own[:n], own[n:], still[:n], still[n:], missed, None))
+        return found
+
     def _along(self, count: int) -> Iterator[Window]:
         curve, n, m = self.curve, len(self.curve.x), len(self.curve.u)
+        along = dict(zip(self.names, (*curve.x, *curve.u), strict=True))
+        missed = [e - f for e, f in zip(curve.slope, replaced(self.F, along), strict=True)]
+        if self.knots is None:
+            missed = [NOUGHT if vanish([e]) else e for e in missed]
         terms = [*curve.x, *curve.u, *curve.slope, *slopes(curve.u, CLOCK)]
-        field = Field(terms, curve.parts[0].values)
+        fields = Field(terms, curve.parts[0].values), Field(missed, curve.parts[0].values)
         whole = sum((float(part.length.mid()) for part in curve.parts), start=0.0)
         timed = self.horizon is not None and curve.moves
         for part in curve.parts:
             pieces = ceil(count * float(part.length.mid()) / whole) if curve.moves and whole else 1
-            own, length = field.with_values(part.values), ceiling(part.length)
-            for lo, hi in pairwise([*(length * k / pieces for k in range(pieces)), length]):
+            own, fine = (field.with_values(part.values) for field in fields)
+            for lo, hi in _parted(0.0, ceiling(part.length), pieces):
                 found = iter(own.hull([(lo, hi)] if own.variables else []))
-                time = part.start + between(lo, hi) if timed else None
                 x, u, speed, steepness = (list(islice(found, size)) for size in (n, m, n, m))
-                yield Window(x, u, speed, steepness, time)
+                off = tops(fine.hull([ends] if fine.variables else []) for ends in _parted(lo, hi, _FINER))
+                yield Window(x, u, speed, steepness, off, part.start + between(lo, hi) if timed else None)
 
     def _cells(self, family: AnyPlan, count: int) -> Iterator[Window]:
         """A grid in what the derivatives of F depend on; x*' is F(x*, u*) within the defect."""
@@ -151,75 +139,43 @@ class Course:
             (a, b), pieces = ends[name], parts if name in split else 1
             own = [exact(a + (b - a) * k / pieces) for k in range(pieces + 1)]
             grid.append([between(low, high) for low, high in pairwise(own)])
-        field, missed = Field(self.F), arb(0, exact(family.defect))
+        field, missed = Field(self.F), [arb(0, exact(family.defect))] * n
         rates = [arb(0, exact(rate)) for rate in family.input_rate or ()]
         for cell in product(*grid):
             values = dict(zip(self.names, cell, strict=True))
             own = field.hull([(floor(values[v]), ceiling(values[v])) for v in field.variables])
-            yield Window(cell[:n], cell[n:], [x + missed for x in own], rates, None)
-
-    # -- how far the plan is from a motion, and how its input is held
-
-    def defect(self) -> list[Ball]:
-        """sup |x*_i' - F_i(x*, u*, p0)|, (n,), and |F_i| where the plan rests."""
-        if self.family is not None:
-            return [exact(self.family.defect)] * len(self.curve.x)
-        along = dict(zip(self.names, (*self.curve.x, *self.curve.u), strict=True))
-        missed = [f - e for f, e in zip(replaced(self.F, along), self.curve.slope, strict=True)]
-        found = [arb(0) if self.knots is None and vanish([e]) else self._supremum(e) for e in missed]
-        if self.spec.afterwards != "rest":
-            return found
-        x, u = self._end
-        return tops([found, Program(self.F, self.names).run([*x, *u])])
-
-    def _supremum(self, term: Term) -> Ball:
-        """sup |term| along the plan: the piece of it with the largest bound is halved, again and again."""
-        parts = self.curve.parts
-        whole = Field([term], parts[0].values)
-
-        def piece(k: int, lo: float, hi: float) -> tuple[float, int, float, float]:
-            own = whole.with_values(parts[k].values)
-            (found,) = own.hull([(lo, hi)] if own.variables else [])
-            return -ceiling(found.abs_upper()), k, lo, hi
-
-        pieces = [piece(k, 0.0, ceiling(part.length)) for k, part in enumerate(parts)]
-        heapify(pieces)
-        for _ in range(_HALVINGS):
-            _, k, lo, hi = pieces[0]
-            middle = 0.5 * lo + 0.5 * hi
-            heapreplace(pieces, piece(k, lo, middle))
-            heappush(pieces, piece(k, middle, hi))
-        return arb(-pieces[0][0])
+            speed = [x + y for x, y in zip(own, missed, strict=True)]
+            yield Window(cell[:n], cell[n:], speed, rates, missed, None)
 
     def held(self, windows: Sequence[Window]) -> list[Ball]:
-        """sup |u*_j - ubar_j| while a command acts, (m,), without rounding."""
+        """sup |u*_j - ubar_j| while a command acts, (m,), without rounding: 0 for jumps where commands begin to act."""
         machine, m = self.spec.hardware, len(self.spec.plant.inputs)
         span = machine.sample_time if machine.hold == "left" else machine.sample_time / 2
         if machine.hold == "continuous" or (self.family is not None and not self.smooth):
             return [arb(0)] * m
-        if self.knots is not None and self.knots.held:
-            return [exact(self._jumps(j, span, self.knots)) for j in range(m)]
-        return [exact(span) * rate for rate in tops(own.steepness for own in windows)]
-
-    def _jumps(self, j: int, span: Fraction, knots: Knots) -> Fraction:
-        """The most that u*_j, held between knots, jumps within a time; 0 if only where commands begin to act.
-
-        At the left end of an interval the computer's time may be that of the interval before.
-        """
-        t, machine, values = knots.t, self.spec.hardware, [row[j] for row in knots.u[:-1]]
-        jumps = [(at, abs(b - a)) for at, (a, b) in zip(t[1:-1], pairwise(values), strict=True)]
+        if self.knots is None or not self.knots.held:
+            return [exact(span) * rate for rate in tops(own.steepness for own in windows)]
+        begins, rows = list(self.knots.t[:-1]), list(self.knots.u[:-1])
         if self.spec.afterwards == "repeat":
-            jumps.append((t[-1], abs(values[0] - values[-1])))
-            jumps += [(at + t[-1], size) for at, size in jumps]
-        jumps = [(at, size) for at, size in jumps if size]
-        rest = machine.delay % machine.sample_time
-        if machine.hold == "middle" and all(
-            ((at - rest) / machine.sample_time).denominator == 1 for at, _ in jumps
-        ):
-            return Fraction(0)
-        reach = span * Fraction(1001, 1000)
-        nearby = ([size for at, size in jumps if begin <= at <= begin + reach] for begin, _ in jumps)
-        return max((sum(own, start=Fraction(0)) for own in nearby), default=Fraction(0))
+            begins += [self.knots.t[-1] + t for t in begins]
+            rows += rows
+        jumps = [t for t, (a, b) in zip(begins[1:], pairwise(rows), strict=True) if a != b]
+        since = machine.delay % machine.sample_time
+        if machine.hold == "middle" and all((t - since) % machine.sample_time == 0 for t in jumps):
+            return [arb(0)] * m
+        reach = span * Fraction(
+            1001, 1000
+        )  # at the left end a computer's time may be that of the interval before
+        near = [
+            rows[k : bisect_right(begins, end + reach)] for k, end in enumerate([*begins[1:], begins[-1]])
+        ]
+        columns = [list(zip(*own, strict=True)) for own in near]
+        return [exact(max(max(own[j]) - min(own[j]) for own in columns)) for j in range(m)]
+
+
+def _parted(lo: float, hi: float, count: int) -> Iterator[tuple[float, float]]:
+    """Equal parts of a range."""
+    return pairwise([*(lo + (hi - lo) * k / count for k in range(count)), hi])
 
 
 def tops(rows: Iterable[Sequence[Ball]]) -> list[Ball]:
@@ -234,15 +190,8 @@ def driven(drift: Sequence[Term], gains: Matrix, inputs: Sequence[str]) -> list[
 
 def course_of(spec: SampledSpecification, plan: Plan) -> Course:
     """The plan of a specification; `plan` holds the knots of one that was planned. Raises `CertificateError`."""
-    trajectory, plant = spec.trajectory, spec.plant
-    if isinstance(trajectory, AnyPlan):
-        return Course(spec, everyone(trajectory, plant.states, plant.inputs), None)
-    if isinstance(trajectory, Resting):
-        at, input_ = ([number(q) for q in own] for own in (trajectory.at, trajectory.input))
-        return Course(spec, expressed(at, input_, TIME, trajectory.horizon), None)
-    if isinstance(trajectory, Expressed):
-        return Course(spec, expressed(trajectory.x, trajectory.u, TIME, trajectory.horizon), None)
-    knots = knots_of(plan, trajectory.between, trajectory.horizon)
+    own, plant = spec.trajectory, spec.plant
     drift = driven(plant.f, plant.B, plant.inputs)
-    curve = hermite(knots, drift, plant.states, plant.inputs, trajectory.horizon)
+    curve = curve_of(own, plan, plant.states, plant.inputs, drift)
+    knots = knots_of(plan, own.between, own.horizon) if isinstance(own, (Planned, Tabled)) else None
     return Course(spec, curve, knots)

@@ -1,0 +1,303 @@
+"""The inequalities of the sampled loop at every sample: of the errors, of what the controller adds, of its memory.
+
+b(k) bounds an output at sample k if the loop has kept to its boxes before; below what is claimed at every k there is no
+first exit. An output is a row, carried back lag by lag: r_i is the middle of the enclosed q_i = r_(i-1) AA. Any
+numbers would do ("free rows"): what they miss, |q_i - r_i| times the box of xi, is added. From a lag of its own on a
+slow signal is taken for any one ("cut"). A product of a row with balls around 0 is a sum of magnitudes.
+Implements: theory of the sampled loop, sections 3 and 5.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import accumulate, chain, pairwise
+
+from flint import arb, arb_mat, ctx
+
+from tubecert.recheck.balls import Ball, between, exact
+from tubecert.recheck.clock import time_is_up, told
+from tubecert.recheck.cover import Outcome
+from tubecert.recheck.metric import CONFIRMED
+from tubecert.recheck.sampled_loop.loop import Loop, around_zero, column, flow, joined, parted, picked, sizes
+from tubecert.recheck.sampled_loop.record import Recipe, Stage
+from tubecert.recheck.sampled_loop.remainders import Size, Slow
+
+_SETUP_BITS = 128  # of matrices: rows are carried in those of the context
+_ROUNDED = 1 + 1e-12  # what floats lose in a length
+_TELLS = 64  # lags
+_MOST_TERMS = 8_000_000  # kept: outputs x phases x lags
+
+
+@dataclass(frozen=True)
+class Phase:
+    """What is known at samples from `start` on, while `stage` lasts and commands of the same stages act or wait.
+
+    The box of xi; rounding of what is `heard`, dy (n), u (m), zeta (z); the remainder `acting` through [I, B] (n + m).
+    """
+
+    start: int
+    stage: Stage
+    box: Sequence[Ball]
+    heard: Sequence[Ball]
+    acting: Sequence[Ball]
+
+
+@dataclass(frozen=True)
+class Amplitudes:
+    """Of signals: balls, one column per phase; of some, in place of these or beside them, the Euclidean length."""
+
+    each: arb_mat
+    lengths: Sequence[tuple[arb_mat, arb_mat]]  # which signals, a column each, and how large
+
+    @classmethod
+    def around_zero(cls, known: Iterable[Sequence[Ball]], sizes: Iterable[tuple[int, Size]]) -> Amplitudes:
+        """Of signals `known` phase by phase; of those from a place on, a size besides."""
+        rows, lengths = [list(row) for row in zip(*known, strict=True)], []
+        for at, own in sizes:
+            if own.length:
+                which = picked(range(at, at + len(own.each)), len(rows)).transpose()
+                lengths.append((which, around_zero(arb_mat([own.each[:1] * len(rows[at])]))))
+            else:
+                for i, most in enumerate(own.each, at):
+                    rows[i] = [x + most for x in rows[i]]
+        return cls(around_zero(arb_mat(rows)), lengths)
+
+    def of(self, rows: arb_mat) -> arb_mat:
+        """What they do through rows (p, signals), at most: balls, (p, phases)."""
+        found = rows * self.each
+        for which, bound in self.lengths:
+            found += column([_long(row) for row in (rows * which).tolist()]) * bound
+        return found
+
+
+def _long(row: Sequence[Ball]) -> Ball:
+    """At least the Euclidean length, in floats."""
+    return arb(math.hypot(*[float(x.abs_upper()) for x in row]) * _ROUNDED + 1e-150)
+
+
+def phases_of(stages: Sequence[Stage], waiting: int) -> Iterator[tuple[int, Stage, tuple[Fraction, ...]]]:
+    """Starts of phases and their stages, with the most of the deviations (m) that act or wait."""
+    starts = [own.start for own in stages]
+    begins = sorted({0, *starts, *(k + waiting for k in starts[1:])})
+    for begin, end in pairwise([*begins, begins[-1] + 1]):
+        first, last = (bisect_right(starts, max(0, k)) for k in (begin - waiting, end - 1))
+        most = zip(*(own.deviations for own in stages[first - 1 : last]), strict=True)
+        yield begin, stages[bisect_right(starts, begin) - 1], tuple(map(max, most))
+
+
+@dataclass(frozen=True)
+class Inequalities:
+    """b(k) against what is claimed of e_1 .. e_n at all times, then of delta and zeta at every sample up to `last`.
+
+    `winds`: columns (n, k), and how large. e(0) is in `error` (n), a point or a box, within a `radius` beside that: in
+    the first box, or the claims of e at sample 0 do not hold.
+    """
+
+    loop: Loop
+    recipe: Recipe
+    phases: Sequence[Phase]
+    noise: Size
+    winds: Sequence[tuple[arb_mat, Size]]
+    slow: Sequence[Slow]
+    error: Sequence[Ball]
+    radius: Ball
+    last: int
+
+    def output(self, f: int) -> Outcome:
+        """An output stays below what is claimed."""
+        most = [exact(own.stage.boxes[f]) for own in self.phases]
+        for k in range(self.last + 1):
+            if not all(b < most[self.phase(k)] for b in self.bounds(f, k)):
+                why = f"the bound at sample {k} is not below what is claimed"
+                return Outcome(verdict="undecided", why=why)
+        return CONFIRMED
+
+    def bounds(self, f: int, k: int) -> list[Ball]:
+        """b(k) of an output: of |e_i| on every piece of the sample."""
+        n, last, p = len(self.error), len(self.nodes) - 1, self.phase(k)
+        if f >= n:
+            return [self._carried[n * last + f][k]]
+        ends = [self._carried[n * a + f][k] for a in range(last + 1)]
+        return [
+            x.max(y) + off[f][p].abs_upper() for (x, y), off in zip(pairwise(ends), self._off, strict=True)
+        ]
+
+    def phase(self, k: int) -> int:
+        """The phase of a sample."""
+        return bisect_right(self.phases, k, key=lambda own: own.start) - 1
+
+    @cached_property
+    def nodes(self) -> list[Fraction]:
+        """Times of a sample between which e is near a chord."""
+        return self.loop.nodes(self.recipe.pieces)
+
+    # -- signals
+
+    @cached_property
+    def _boxes(self) -> Amplitudes:
+        """Of xi."""
+        return Amplitudes.around_zero((own.box for own in self.phases), [])
+
+    @cached_property
+    def _heard(self) -> Amplitudes:
+        """Of noise and rounding of dy (n), of rounding of u (m) and of zeta (z)."""
+        return Amplitudes.around_zero((own.heard for own in self.phases), [(0, self.noise)])
+
+    @cached_property
+    def _begun(self) -> Amplitudes:
+        """xi_0, signed where it is known."""
+        still = [arb(0)] * (self.loop.width - len(self.error) - len(self.slow))
+        begun = [*self.error, *still, *(arb(0, own.first.abs_upper()) for own in self.slow)]
+        near = picked(range(len(self.error)), self.loop.width).transpose(), arb_mat([[arb(0, self.radius)]])
+        return Amplitudes(column(begun), [near] if self.radius > 0 else [])
+
+    @cached_property
+    def _entries(self) -> arb_mat:
+        """Through which columns the remainder, winds and slow signals act, (n, ..)."""
+        n = len(self.error)
+        return joined([[picked(range(n), n), self.loop.B, *(own for own, _ in self.winds), self.loop.H]])
+
+    @cached_property
+    def _acting(self) -> Amplitudes:
+        """Of the remainder, of winds, of slow signals (r) and of their rates (r)."""
+        slow = [*(own.size for own in self.slow), *(own.rate for own in self.slow)]
+        counts = [len(own.each) for _, own in self.winds]
+        known = [[*own.acting, *[arb(0)] * sum(counts), *slow] for own in self.phases]
+        places = accumulate(counts, initial=len(self.phases[0].acting))
+        return Amplitudes.around_zero(known, zip(places, (own for _, own in self.winds), strict=False))
+
+    def _gamma(self, age: Ball, order: int = 0) -> arb_mat:
+        """What they do to xi in that time, (width, signals), or its derivative of an order."""
+        moved, steady = flow(self.loop.A, age)
+        for _ in range(order):
+            moved, steady = self.loop.A * moved, moved
+        r, (n, columns) = len(self.slow), (self._entries.nrows(), self._entries.ncols())
+        kept = picked(range(columns, columns + (0 if order else r)), columns + r)
+        above = joined([[moved * self._entries, steady * self.loop.H]])
+        between_ = arb_mat(self.loop.width - n - kept.nrows(), columns + r)
+        return joined([[above], [between_], [kept]])
+
+    def _kernels(self, until: Fraction) -> list[arb_mat]:
+        """Through these rows have int_0^until |r gamma| at most: |g| <= chord + (d^3/12 a panel) sup|g''|."""
+        panels = self.recipe.panels
+        d = exact(until) / panels
+        ages = [d * k for k in range(panels + 1)]
+        chords = [self._gamma(age) * (d / 2 if k in (0, panels) else d) for k, age in enumerate(ages)]
+        bent = [sizes(self._gamma(between(a.lower(), b.upper()), 2)) for a, b in pairwise(ages)]
+        return [*chords, around_zero(sum(bent[1:], start=bent[0]) * (d * d * d / 12))]
+
+    def _through(self, rows: arb_mat, kernels: Sequence[arb_mat], off: Iterable[tuple[int, int]]) -> arb_mat:
+        """What acts through rows and each of the kernels, but for signals that are off: (p, phases)."""
+        found = arb_mat(rows.nrows(), len(self.phases))
+        for own in kernels:
+            shown = rows * own
+            for place in off:
+                shown[place] = 0
+            found += self._acting.of(shown)
+        return found
+
+    # -- within a sample
+
+    def _within(self, kernels: Sequence[arb_mat]) -> arb_mat:
+        """What acts on e within a sample, slow signals by their rates: (n, phases)."""
+        n, first, r = len(self.error), self._entries.ncols() - len(self.slow), len(self.slow)
+        off = [(i, first + c) for i in range(n) for c in range(r)]
+        return self._through(picked(range(n), self.loop.width), kernels, off)
+
+    @cached_property
+    def _off(self) -> list[list[list[Ball]]]:
+        """How far e may be from its chord on every piece, d^2/8 sup|e''|, by state and phase."""
+        with ctx.workprec(_SETUP_BITS):
+            return [self._piece(a, b) for a, b in pairwise(self.nodes)]
+
+    def _piece(self, a: Fraction, b: Fraction) -> list[list[Ball]]:
+        loop, half = self.loop, exact((b - a) / 2)
+        moved = loop.A * flow(loop.A, arb(0, half.upper()))[0]
+        of_xi, heard = parted(moved * loop.error_rate(exact((a + b) / 2), later=a >= loop.rest), loop.width)
+        swings = self._within([self._gamma(between(exact(a).lower(), exact(b).upper()), 1)])
+        bent = self._boxes.of(of_xi) + self._heard.of(heard) + swings
+        found: list[list[Ball]] = (bent * (half * half / 2)).tolist()
+        return found
+
+    # -- from sample to sample
+
+    @cached_property
+    def _carried(self) -> list[list[Ball]]:
+        """b(k) of e at every node, then of delta and of zeta, k = 0 .. last.
+
+        Raises `ArithmeticError` if these are too many, or the time is up.
+        """
+        lags, outputs = min(self.recipe.lags, self.last), len(self.recipe.cuts)
+        outputs += (len(self.nodes) - 1) * len(self.error)
+        if outputs * len(self.phases) * lags > _MOST_TERMS:
+            raise ArithmeticError("there are too many rows, phases and lags")
+        terms, started = [], []
+        for q, found in self._lags(lags):
+            terms.append([[x.abs_upper() for x in row] for row in found.tolist()])
+            started.append(sizes(self._begun.of(q)).entries())
+        late = self._boxes.of(q).tolist()
+        ends = [*(own.start for own in self.phases), self.last + 1]
+        spans = [  # by sample: which lags, from one to another, are of samples of which phase
+            [
+                (p, max(0, k + 1 - end), min(lags, k - begin) + 1)
+                for p, (begin, end) in enumerate(pairwise(ends))
+                if begin <= k < end + lags
+            ]
+            for k in range(self.last + 1)
+        ]
+        earlier, carried = [self.phase(k) for k in range(1, self.last + 1 - lags)], []
+        for f in range(outputs):
+            by_phase = zip(*(lag[f] for lag in terms), strict=True)
+            sums = [list(accumulate(own, initial=arb(0))) for own in by_phase]
+            gathered = (sum((sums[p][b] - sums[p][a] for p, a, b in own), start=arb(0)) for own in spans)
+            rest = chain((own[f] for own in started), (late[f][p].abs_upper() for p in earlier))
+            carried.append([x + y for x, y in zip(gathered, rest, strict=True)])
+        return carried
+
+    def _lags(self, lags: int) -> Iterator[tuple[arb_mat, arb_mat]]:
+        """At every lag the enclosed rows q; what acts at its sample, and from there to the one after: (p, phases)."""
+        loop, n, r = self.loop, len(self.error), len(self.slow)
+        size, eta = (
+            self._entries.ncols() - r,
+            loop.width - r,
+        )  # where slow signals are, of those that act, and in xi
+        with ctx.workprec(_SETUP_BITS):
+            nodes = [loop.error(exact(s), later=s >= loop.rest) for s in self.nodes]
+            q, heard = parted(joined([[own] for own in (*nodes, loop.sent[0], loop.parts[1])]), loop.width)
+            step, arriving = parted(loop.step, loop.width)
+            acting = [self._within(self._kernels(s)) for s in self.nodes]
+            acting.append(arb_mat(q.nrows() - n * len(nodes), len(self.phases)))
+            found, kernels = joined([[own] for own in acting]), self._kernels(loop.sample)
+        found += self._heard.of(heard)
+        each = enumerate(self.recipe.cuts[:n] * len(nodes) + self.recipe.cuts[n:])
+        cuts = {(f, c): lag for f, row in each for c, lag in zip(range(r), row, strict=True)}
+        off = {(f, size + c) for f, c in cuts}  # up to its cut a signal counts by its rate, then by its size
+        owed: dict[tuple[int, int], Ball] = {}
+        for lag in range(lags + 1):
+            _tell(lag, lags)
+            rows = q.mid()
+            missed = q - rows
+            for place, entry in owed.items():
+                missed[place] = entry
+            yield q, found + self._boxes.of(missed)
+            owed = {}
+            for f, c in (place for place, at in cuts.items() if at == lag):
+                owed[f, eta + c], rows[f, eta + c] = rows[f, eta + c], 0
+                off ^= {(f, size + c), (f, size + r + c)}
+            found, q = self._through(rows, kernels, off) + self._heard.of(rows * arriving), rows * step
+            for f, c in (place for place, at in cuts.items() if at <= lag):
+                q[f, eta + c] = 0
+
+
+def _tell(lag: int, lags: int) -> None:
+    """Raises `ArithmeticError` if the time is up."""
+    if lag % _TELLS == 0:
+        if time_is_up():
+            raise ArithmeticError("the time was up")
+        if (tell := told()) is not None:
+            tell(lag, lag / (lags + 1))
