@@ -243,6 +243,17 @@ def files(tmp_path):
     return write
 
 
+@pytest.mark.slow
+def test_what_is_locked_may_have_half_widths(files):
+    path, target = files(SMALL.replace("adaptation:", "expect: {half_widths: {x: [0, 1]}}\nadaptation:"))
+    done = command(target, "--spec", path)
+    assert done.exit_code == 0, done.stderr
+    result = json.loads(target.read_text(encoding="utf-8"))["result"]
+    result["spec"]["effective"]["expect"]["half_widths"]["z"] = ["0", "1"]
+    target.write_text(json.dumps(certificate.seal(result, {})), encoding="utf-8")
+    assert "half_widths.z is not known" in command(target).stderr
+
+
 def command(*arguments):
     return CliRunner().invoke(app, ["recheck", "-q", *map(str, arguments)])
 

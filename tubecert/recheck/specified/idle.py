@@ -14,11 +14,15 @@ _LOCKED = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "larges
 def read_idle(own: Members, plant: Plant) -> None:
     """Known keys all the same."""
     if "expect" in own:
-        locked = own["expect"].closed(optional=("verdict", "metric", *_LOCKED))
+        locked = own["expect"].closed(optional=("verdict", "metric", "half_widths", *_LOCKED))
         for key in ("verdict", "metric"):
             locked.get(key, Node.text)
         for key in _LOCKED:
             locked.get(key, lambda item: several(item, 2))
+        if "half_widths" in locked:
+            widths = locked["half_widths"].closed(optional=plant.lengths)
+            for key in plant.lengths:
+                widths.get(key, lambda item: several(item, 2))
     if "simulation" in own:
         numbers, texts = ("runs", "seed", "duration"), ("controllers", "plane", "h")
         simulation = own["simulation"].closed(optional=("gains", *numbers, *texts))
