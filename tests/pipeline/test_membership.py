@@ -126,6 +126,37 @@ def test_between_knots_a_curve_may_leave_what_its_knots_keep(tmp_path, family):
     assert "p* goes 0.04 beyond its range at t = 0.25 s" in done.output
 
 
+MACHINE = FAMILY[: FAMILY.index("metric:")].replace("0.05, horizon", "5, horizon")
+MACHINE += "hardware: {rate: 10, delay: 0.05}\n"
+RATED = MACHINE.replace("defect: 5", "input_rate: 2, defect: 5")
+
+
+@pytest.mark.parametrize(("family", "at", "how", "words"), [
+    (MACHINE, (0.05, 0.25), "hold", ""),
+    (MACHINE, (0.05, 0.2), "hold", "u* changes while an input is held"),
+    (MACHINE, (0.05, 0.25), "linear", "u* changes while an input is held"),
+    (RATED, (0.05, 0.25), "linear", ""),
+    (RATED, (0.05, 0.15), "linear", "u*' goes 1 beyond its range"),
+    (RATED, (0.05, 0.25), "hold", "u* jumps"),
+])  # fmt: skip
+def test_beside_hardware_inputs_move_as_the_family_says(tmp_path, family, at, how, words):
+    """u* = .2 up to one time, .5 from another one on; its last value is that of the end."""
+    rows = [(0, 0, 0, 0.2), (at[0], 0, 0, 0.2), (at[1], 0, 0, 0.5), (1, 0, 0, 0.5)]
+    if how == "hold":
+        rows[1:2] = []
+    table(tmp_path, rows)
+    own = f"{{kind: csv, file: plan.csv, interpolation: {how}}}"
+    text = MACHINE.replace(MACHINE.split("trajectory: ")[1].split("\n", maxsplit=1)[0], own)
+    text = text.replace("initial_state: {within: 0.1}\n", "")
+    (found,) = membership(load_text(text, str(tmp_path / "own.yaml")), load_text(family), "it")
+    assert (words or "is a plan of the family") in found.message
+    (tmp_path / "any.yaml").write_text(MACHINE)
+    told = run(
+        "check", "--family", tmp_path / "any.yaml", tmp_path / "plan.csv"
+    ).exit_code  # as a machine holds it
+    assert told == (1 if at[1] == 0.2 else 0)
+
+
 def test_the_last_input_of_a_held_plan_is_not_reached(tmp_path, family):
     table(tmp_path, [(0, 0.5, 0, 0.5), (1, 0.5, 0, 0.5), (2, 0.5, 0, 9)])
     plan = tmp_path / "held.yaml"

@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
 from math import isfinite
 from pathlib import Path
 
@@ -17,15 +18,16 @@ from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
 from tubecert.errors import SpecError
-from tubecert.expression import ZERO, Expression
+from tubecert.expression import ZERO, Expression, derivatives
 from tubecert.findings import Finding, Severity
-from tubecert.model import ControlAffineModel, build
+from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.printable import visible
 from tubecert.spec import Knots, Spec, canonical, load, load_text
 from tubecert.spec.types import Bundle
 from tubecert.trajectory import Plan
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.make import plan_of
+from tubecert.trajectory.pieces import TAU
 
 NO_MEMBER, UNDECIDED = "TC411", "TC412"
 _FINE = 1e-9  # relative to the range: how closely a curve is looked at
@@ -69,6 +71,7 @@ def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None
         part = _Part(kept=None, words="f or B is not defined at one of its knots")
         return [part.finding(name)]
     parts = [*_horizon(plan, family), *_boxes(plan, family, bundle, effort or Effort())]
+    parts += _held(plan, family, bundle, effort or Effort())
     parts.append(_defect(plan, model, bundle.defect, effort or Effort()))
     missed = [part.finding(name) for part in parts if not part.kept]
     if missed:
@@ -98,6 +101,27 @@ def _boxes(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator
         else:  # held or linear between knots: no further out than at one of them
             yield _at_knots(f"{name}*", plan.knots, plan.horizon, [u[j] for u in plan.knots.u], high)
             yield _at_knots(f"{name}*", plan.knots, plan.horizon, [-u[j] for u in plan.knots.u], -low)
+
+
+def _held(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator[_Part]:
+    """Beside hardware: |u*'| is within its rate; where there is none, u* changes only when a command begins to act."""
+    machine, knots, rates = family.hardware, plan.knots, bundle.input_rate
+    if machine is None or (len(set(knots.u)) == 1 if knots else plan.is_constant):
+        return
+    held = knots is not None and knots.interpolation == "hold"
+    changes = pairwise(zip(knots.t, knots.u, strict=True)) if knots is not None and held else ()
+    jumps = [t for (_, before), (t, after) in changes if before != after and t != plan.horizon]
+    if rates is None:
+        late = [(t - machine.delayed) / machine.sample_time for t in jumps]
+        words = "u* changes while an input is held, which a family without input_rate does not allow"
+        yield _Part(kept=held and all(k >= 0 and k.denominator == 1 for k in late), words=words)
+    elif held:
+        yield _Part(kept=not jumps, words="u* jumps, and input_rate does not allow it")
+    else:
+        slopes = derivatives(plan.u, TAU if knots else TIME)
+        for name, slope, rate in zip(family.inputs, slopes, rates, strict=True):
+            yield _stays(f"{name}*'", slope, plan, rate, effort)
+            yield _stays(f"{name}*'", -slope, plan, rate, effort)
 
 
 def _at_knots(
@@ -162,7 +186,9 @@ def _kept(found: Supremum, limit: Fraction) -> bool | None:
 def member_spec(path: str, family: Spec) -> Spec:
     """The family's system with one plan; raises `SpecError` if the file has none that fits."""
     if Path(path).suffix.lower() == ".csv":
-        table = {"kind": "csv", "file": Path(path).name}
+        bundle, table = family.trajectory.bundle, {"kind": "csv", "file": Path(path).name}
+        if family.hardware is not None and bundle is not None and bundle.input_rate is None:
+            table["interpolation"] = "hold"
         kept = ("tubecert", "name", "system", "safe_set", "uncertainty")
         own = {key: value for key, value in canonical(family).items() if key in kept} | {"trajectory": table}
         return load_text(json.dumps(own), str(Path(path).with_name("family")))
