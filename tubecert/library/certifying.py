@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tubecert import certificate
 from tubecert.executor import Executor, held
@@ -128,7 +128,7 @@ def certified(
     return certification_of(sealed, Specification(spec=overridden(spec, options)))
 
 
-def ran(command: str) -> Callable[[], dict[str, Any]]:
+def ran(command: str) -> Callable[[], Mapping[str, object]]:
     """What is noted of a run that begins now, once it is over: command line, beginning, seconds, versions."""
     started, clock = datetime.now(UTC), time.perf_counter()
     return lambda: {
