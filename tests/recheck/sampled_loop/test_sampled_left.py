@@ -103,7 +103,7 @@ def test_rows_change_as_their_derivatives_say(delay):
     for s, later in ((arb("0.05"), True), (arb("0.02"), not loop.rest)):
         h = arb("1e-6")
         moved = (loop.error(s + h, later=later) - loop.error(s - h, later=later)) * (1 / (2 * h))
-        for x, y in zip(moved.entries(), loop.error_rate(s, later=later).entries(), strict=True):
+        for x, y in zip(moved.entries(), loop.error(s, 1, later=later).entries(), strict=True):
             assert abs(x - y) < 1e-7
 
 

@@ -55,13 +55,6 @@ def around_zero(a: arb_mat) -> arb_mat:
     return arb_mat(a.nrows(), a.ncols(), [arb(0, x.abs_upper()) for x in a.entries()])
 
 
-def flow(A: arb_mat, t: Ball) -> tuple[arb_mat, arb_mat]:
-    """e^(A t) and int_0^t e^(A s) ds, both (n, n), for every t of the ball: e^[[A t, I t], [0, 0]] holds both."""
-    n = A.nrows()
-    whole = joined([[A * t, picked(range(n), n) * t], [arb_mat(n, 2 * n)]]).exp().tolist()
-    return parted(arb_mat(whole[:n]), n)
-
-
 @dataclass(frozen=True)
 class Loop:
     """A (n, n), B (n, m), H (n, r); tables F (z, z), G (z, n), M (m, z), N (m, n); times in s."""
@@ -113,17 +106,34 @@ class Loop:
         e, zeta, *waiting, _, heard, rounded, _ = self.parts
         return [self.N * (e + heard) + self.M * zeta + rounded, *waiting]
 
-    def error(self, s: Ball, *, later: bool) -> arb_mat:
-        """Rows of e(t_k + s), (n, ..), but for what acts on it from t_k on; `later`: s is not before tau'."""
-        own, steady = flow(self.A, s)
-        now = flow(self.A, s - exact(self.rest))[1] * self.B if later else 0 * self.B
-        inputs = (steady * self.B - now) * self.sent[-1] + now * self.sent[self.whole]
-        return own * self.parts[0] + inputs + steady * self.H * self.parts[-4]
+    @cached_property
+    def flows(self) -> list[arb_mat]:
+        """Rows of what changes e between samples, (n + r + m, ..): e itself, eta, the input that acts at first."""
+        return [self.parts[0], self.parts[-4], self.sent[-1]]
 
-    def error_rate(self, s: Ball, *, later: bool) -> arb_mat:
-        """Their derivatives by s."""
-        inputs = self.B * self.sent[self.whole if later else -1]
-        return self.A * self.error(s, later=later) + inputs + self.H * self.parts[-4]
+    def flow(self, t: Ball, order: int = 0) -> arb_mat:
+        """Its exponential, (n + r + m) square, or the derivative by t of an order, for every t of the ball.
+
+        With P = e^(A t) and J its integral from 0 on, e^([A H B; 0 0 0; 0 0 0] t) = [P JH JB; 0 I 0; 0 0 I].
+        """
+        rates = joined([[self.A, self.H, self.B]])
+        rates = joined([[rates], [arb_mat(rates.ncols() - rates.nrows(), rates.ncols())]])
+        found = (rates * t).exp()
+        for _ in range(order):
+            found = rates * found
+        return found
+
+    def error(self, s: Ball, order: int = 0, *, later: bool) -> arb_mat:
+        """Rows of e(t_k + s), (n, ..), but for what acts on it from t_k on, or their derivative by s of an order.
+
+        `later`: s is not before tau'.
+        """
+        n, m = self.A.nrows(), self.B.ncols()
+        found = self.flow(s, order) * joined([[own] for own in self.flows])
+        if later:
+            other = arb_mat(found.nrows() - m, found.ncols()), self.sent[self.whole] - self.sent[-1]
+            found += self.flow(s - exact(self.rest), order) * joined([[own] for own in other])
+        return picked(range(n), found.nrows()) * found
 
     @property
     def step(self) -> arb_mat:

@@ -94,6 +94,10 @@ class Remainders:
         jumps = zip(course.held(self.windows), self.inputs_above, strict=True)
         self.held = [x + exact(PLAN) * above for x, above in jumps]
 
+    @cached_property
+    def _defect(self) -> list[Ball]:
+        return self._course.defect()
+
     # -- signals
 
     def sudden(self) -> list[tuple[arb_mat, Size]]:
@@ -175,7 +179,7 @@ class Remainders:
         for j, eta in zip(self._matched, slow, strict=False):
             acting[j] = eta.size
         bent = tops(self._off(own, W, U, acting) for own in self.windows)
-        missed = tops(own.missed for own in self.windows)
+        missed = list(self._defect)
         if not self._slow:
             for i, (size, _) in self._strangeness.items():
                 missed[i] += size

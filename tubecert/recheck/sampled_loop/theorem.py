@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate, chain, pairwise
+from itertools import accumulate, chain, pairwise, product
 
 from flint import arb, arb_mat, ctx
 
@@ -23,7 +23,7 @@ from tubecert.recheck.balls import Ball, between, exact
 from tubecert.recheck.clock import time_is_up, told
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import CONFIRMED
-from tubecert.recheck.sampled_loop.loop import Loop, around_zero, column, flow, joined, parted, picked, sizes
+from tubecert.recheck.sampled_loop.loop import Loop, around_zero, column, joined, parted, picked, sizes
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.remainders import Size, Slow
 
@@ -157,30 +157,31 @@ class Inequalities:
         return Amplitudes(column(begun), [near] if self.radius > 0 else [])
 
     @cached_property
-    def _entries(self) -> arb_mat:
-        """Through which columns the remainder, winds and slow signals act, (n, ..)."""
-        n = len(self.error)
-        return joined([[picked(range(n), n), self.loop.B, *(own for own, _ in self.winds), self.loop.H]])
-
-    @cached_property
     def _acting(self) -> Amplitudes:
-        """Of the remainder, of winds, of slow signals (r) and of their rates (r)."""
+        """Of slow signals (r) and of their rates (r), of the remainder, of winds."""
         slow = [*(own.size for own in self.slow), *(own.rate for own in self.slow)]
         counts = [len(own.each) for _, own in self.winds]
-        known = [[*own.acting, *[arb(0)] * sum(counts), *slow] for own in self.phases]
-        places = accumulate(counts, initial=len(self.phases[0].acting))
+        known = [[*slow, *own.acting, *[arb(0)] * sum(counts)] for own in self.phases]
+        places = accumulate(counts, initial=len(slow) + len(self.phases[0].acting))
         return Amplitudes.around_zero(known, zip(places, (own for _, own in self.winds), strict=False))
+
+    @cached_property
+    def _entries(self) -> arb_mat:
+        """Through which columns these act on e, on eta and on the input, (n + r + m, signals)."""
+        n, r, m = len(self.error), len(self.slow), self.loop.B.ncols()
+        fast = joined([[picked(range(n), n), self.loop.B, *(own for own, _ in self.winds)]])
+        kept = picked(range(r), r + m).transpose()
+        on_e, others = (
+            [self.loop.H, arb_mat(n, r), fast],
+            [arb_mat(r + m, r), kept, arb_mat(r + m, fast.ncols())],
+        )
+        return joined([on_e, others])
 
     def _gamma(self, age: Ball, order: int = 0) -> arb_mat:
         """What they do to xi in that time, (width, signals), or its derivative of an order."""
-        moved, steady = flow(self.loop.A, age)
-        for _ in range(order):
-            moved, steady = self.loop.A * moved, moved
-        r, (n, columns) = len(self.slow), (self._entries.nrows(), self._entries.ncols())
-        kept = picked(range(columns, columns + (0 if order else r)), columns + r)
-        above = joined([[moved * self._entries, steady * self.loop.H]])
-        between_ = arb_mat(self.loop.width - n - kept.nrows(), columns + r)
-        return joined([[above], [between_], [kept]])
+        e, eta, _ = (parted(own, self.loop.width)[0].transpose() for own in self.loop.flows)
+        into = joined([[e, eta, arb_mat(self.loop.width, self.loop.B.ncols())]])
+        return into * (self.loop.flow(age, order) * self._entries)
 
     def _kernels(self, until: Fraction) -> list[arb_mat]:
         """Through these rows have int_0^until |r gamma| at most: |g| <= chord + (d^3/12 a panel) sup|g''|."""
@@ -205,9 +206,8 @@ class Inequalities:
 
     def _within(self, kernels: Sequence[arb_mat]) -> arb_mat:
         """What acts on e within a sample, slow signals by their rates: (n, phases)."""
-        n, first, r = len(self.error), self._entries.ncols() - len(self.slow), len(self.slow)
-        off = [(i, first + c) for i in range(n) for c in range(r)]
-        return self._through(picked(range(n), self.loop.width), kernels, off)
+        n, rates_only = len(self.error), product(range(len(self.error)), range(len(self.slow)))
+        return self._through(picked(range(n), self.loop.width), kernels, list(rates_only))
 
     @cached_property
     def _off(self) -> list[list[list[Ball]]]:
@@ -216,12 +216,11 @@ class Inequalities:
             return [self._piece(a, b) for a, b in pairwise(self.nodes)]
 
     def _piece(self, a: Fraction, b: Fraction) -> list[list[Ball]]:
-        loop, half = self.loop, exact((b - a) / 2)
-        moved = loop.A * flow(loop.A, arb(0, half.upper()))[0]
-        of_xi, heard = parted(moved * loop.error_rate(exact((a + b) / 2), later=a >= loop.rest), loop.width)
-        swings = self._within([self._gamma(between(exact(a).lower(), exact(b).upper()), 1)])
+        s, square = between(exact(a).lower(), exact(b).upper()), exact((b - a) ** 2 / 8)
+        of_xi, heard = parted(self.loop.error(s, 2, later=a >= self.loop.rest), self.loop.width)
+        swings = self._within([self._gamma(s, 1)])
         bent = self._boxes.of(of_xi) + self._heard.of(heard) + swings
-        found: list[list[Ball]] = (bent * (half * half / 2)).tolist()
+        found: list[list[Ball]] = (bent * square).tolist()
         return found
 
     # -- from sample to sample
@@ -262,10 +261,7 @@ class Inequalities:
     def _lags(self, lags: int) -> Iterator[tuple[arb_mat, arb_mat]]:
         """At every lag the enclosed rows q; what acts at its sample, and from there to the one after: (p, phases)."""
         loop, n, r = self.loop, len(self.error), len(self.slow)
-        size, eta = (
-            self._entries.ncols() - r,
-            loop.width - r,
-        )  # where slow signals are, of those that act, and in xi
+        eta = loop.width - r  # where it begins in xi
         with ctx.workprec(_SETUP_BITS):
             nodes = [loop.error(exact(s), later=s >= loop.rest) for s in self.nodes]
             q, heard = parted(joined([[own] for own in (*nodes, loop.sent[0], loop.parts[1])]), loop.width)
@@ -276,7 +272,7 @@ class Inequalities:
         found += self._heard.of(heard)
         each = enumerate(self.recipe.cuts[:n] * len(nodes) + self.recipe.cuts[n:])
         cuts = {(f, c): lag for f, row in each for c, lag in zip(range(r), row, strict=True)}
-        off = {(f, size + c) for f, c in cuts}  # up to its cut a signal counts by its rate, then by its size
+        off = set(cuts)  # up to its cut a signal counts by its rate, then by its size
         owed: dict[tuple[int, int], Ball] = {}
         for lag in range(lags + 1):
             _tell(lag, lags)
@@ -288,7 +284,7 @@ class Inequalities:
             owed = {}
             for f, c in (place for place, at in cuts.items() if at == lag):
                 owed[f, eta + c], rows[f, eta + c] = rows[f, eta + c], 0
-                off ^= {(f, size + c), (f, size + r + c)}
+                off ^= {(f, c), (f, r + c)}
             found, q = self._through(rows, kernels, off) + self._heard.of(rows * arriving), rows * step
             for f, c in (place for place, at in cuts.items() if at <= lag):
                 q[f, eta + c] = 0

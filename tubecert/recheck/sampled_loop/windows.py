@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, reduce
+from heapq import heapify, heappush, heapreplace
 from itertools import islice, pairwise, product
 from math import ceil
 
@@ -26,21 +27,20 @@ from tubecert.recheck.reading import upright
 from tubecert.recheck.specification import SampledSpecification
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Planned, Tabled
 from tubecert.recheck.system import curve_of, knots_of
-from tubecert.recheck.terms import NOUGHT, Matrix, Term, names, plus, replaced, slopes, times, variable
+from tubecert.recheck.terms import Matrix, Term, names, plus, replaced, slopes, times, variable
 from tubecert.recheck.times import common_period
 
-_FINER = 4  # parts of a window, where it is asked how far it is from a motion of the plant
+_HALVINGS = 500  # for one supremum along a plan
 
 
 @dataclass(frozen=True)
 class Window:
-    """Boxes of x* (n) and u* (m), of x*', u*' and x*' - F(x*, u*, p0) (n), and when; `time` None: at any time."""
+    """Boxes of x* (n) and u* (m), of x*' and u*', and when that is; `time` None: at any time."""
 
     x: Sequence[Ball]
     u: Sequence[Ball]
     speed: Sequence[Ball]
     steepness: Sequence[Ball]
-    missed: Sequence[Ball]
     time: Ball | None
 
 
@@ -95,38 +95,67 @@ class Course:
         """Of states and inputs."""
         return (*self.spec.plant.states, *self.spec.plant.inputs)
 
+    @property
+    def _end(self) -> tuple[list[Ball], list[Ball]]:
+        """x* and u* at the end, of inputs that jump there those before."""
+        last, n = self.curve.parts[-1], len(self.curve.x)
+        field = self.curve.field.with_values(last.values)
+        found = field.at([last.length] if field.variables else [])
+        return found[:n], found[n:]
+
     def windows(self, count: int) -> list[Window]:
         """About so many windows, or cells, that cover it."""
         if self.family is not None:
             return list(self._cells(self.family, count))
         found = list(self._along(count))
-        if self.spec.afterwards == "rest":  # without moving; where inputs jump at the end they stay as before
-            last, n = self.curve.parts[-1], len(self.curve.x)
-            field = self.curve.field.with_values(last.values)
-            own = field.at([last.length] if field.variables else [])
-            still = [arb(0)] * len(own)
-            missed = Program(self.F, self.names).run(own)
-            found.append(Window(own[:n], own[n:], still[:n], still[n:], missed, None))
+        if self.spec.afterwards == "rest":
+            x, u = self._end
+            found.append(Window(x, u, [arb(0)] * len(x), [arb(0)] * len(u), None))
         return found
 
     def _along(self, count: int) -> Iterator[Window]:
         curve, n, m = self.curve, len(self.curve.x), len(self.curve.u)
-        along = dict(zip(self.names, (*curve.x, *curve.u), strict=True))
-        missed = [e - f for e, f in zip(curve.slope, replaced(self.F, along), strict=True)]
-        if self.knots is None:
-            missed = [NOUGHT if vanish([e]) else e for e in missed]
         terms = [*curve.x, *curve.u, *curve.slope, *slopes(curve.u, CLOCK)]
-        fields = Field(terms, curve.parts[0].values), Field(missed, curve.parts[0].values)
+        field = Field(terms, curve.parts[0].values)
         whole = sum((float(part.length.mid()) for part in curve.parts), start=0.0)
         timed = self.horizon is not None and curve.moves
         for part in curve.parts:
             pieces = ceil(count * float(part.length.mid()) / whole) if curve.moves and whole else 1
-            own, fine = (field.with_values(part.values) for field in fields)
-            for lo, hi in _parted(0.0, ceiling(part.length), pieces):
+            own, length = field.with_values(part.values), ceiling(part.length)
+            for lo, hi in pairwise([*(length * k / pieces for k in range(pieces)), length]):
                 found = iter(own.hull([(lo, hi)] if own.variables else []))
                 x, u, speed, steepness = (list(islice(found, size)) for size in (n, m, n, m))
-                off = tops(fine.hull([ends] if fine.variables else []) for ends in _parted(lo, hi, _FINER))
-                yield Window(x, u, speed, steepness, off, part.start + between(lo, hi) if timed else None)
+                yield Window(x, u, speed, steepness, part.start + between(lo, hi) if timed else None)
+
+    def defect(self) -> list[Ball]:
+        """sup |x*_i' - F_i(x*, u*, p0)|, (n,), and |F_i| where the plan rests."""
+        if self.family is not None:
+            return [exact(self.family.defect)] * len(self.curve.x)
+        along = dict(zip(self.names, (*self.curve.x, *self.curve.u), strict=True))
+        missed = [f - e for f, e in zip(replaced(self.F, along), self.curve.slope, strict=True)]
+        found = [arb(0) if self.knots is None and vanish([e]) else self._supremum(e) for e in missed]
+        if self.spec.afterwards != "rest":
+            return found
+        x, u = self._end
+        return tops([found, Program(self.F, self.names).run([*x, *u])])
+
+    def _supremum(self, term: Term) -> Ball:
+        """sup |term| along the plan: the piece of it with the largest bound is halved, again and again."""
+        whole, parts = Field([term], self.curve.parts[0].values), self.curve.parts
+
+        def piece(k: int, lo: float, hi: float) -> tuple[float, int, float, float]:
+            own = whole.with_values(parts[k].values)
+            (found,) = own.hull([(lo, hi)] if own.variables else [])
+            return -ceiling(found.abs_upper()), k, lo, hi
+
+        pieces = [piece(k, 0.0, ceiling(part.length)) for k, part in enumerate(parts)]
+        heapify(pieces)
+        for _ in range(_HALVINGS):
+            _, k, lo, hi = pieces[0]
+            middle = 0.5 * lo + 0.5 * hi
+            heapreplace(pieces, piece(k, lo, middle))
+            heappush(pieces, piece(k, middle, hi))
+        return arb(-pieces[0][0])
 
     def _cells(self, family: AnyPlan, count: int) -> Iterator[Window]:
         """A grid in what the derivatives of F depend on; x*' is F(x*, u*) within the defect."""
@@ -139,13 +168,12 @@ class Course:
             (a, b), pieces = ends[name], parts if name in split else 1
             own = [exact(a + (b - a) * k / pieces) for k in range(pieces + 1)]
             grid.append([between(low, high) for low, high in pairwise(own)])
-        field, missed = Field(self.F), [arb(0, exact(family.defect))] * n
+        field, missed = Field(self.F), arb(0, exact(family.defect))
         rates = [arb(0, exact(rate)) for rate in family.input_rate or ()]
         for cell in product(*grid):
             values = dict(zip(self.names, cell, strict=True))
             own = field.hull([(floor(values[v]), ceiling(values[v])) for v in field.variables])
-            speed = [x + y for x, y in zip(own, missed, strict=True)]
-            yield Window(cell[:n], cell[n:], speed, rates, missed, None)
+            yield Window(cell[:n], cell[n:], [x + missed for x in own], rates, None)
 
     def held(self, windows: Sequence[Window]) -> list[Ball]:
         """sup |u*_j - ubar_j| while a command acts, (m,), without rounding: 0 for jumps where commands begin to act."""
@@ -171,11 +199,6 @@ class Course:
         ]
         columns = [list(zip(*own, strict=True)) for own in near]
         return [exact(max(max(own[j]) - min(own[j]) for own in columns)) for j in range(m)]
-
-
-def _parted(lo: float, hi: float, count: int) -> Iterator[tuple[float, float]]:
-    """Equal parts of a range."""
-    return pairwise([*(lo + (hi - lo) * k / count for k in range(count)), hi])
 
 
 def tops(rows: Iterable[Sequence[Ball]]) -> list[Ball]:
