@@ -338,11 +338,11 @@ def test_integrals_of_kernels(length):
         value = rows @ each @ K + (0 if more is None else more)
         size = np.linalg.norm(value, axis=-1, keepdims=True) if length else np.abs(value)
         close(
-            Kernel(own, A, K, ends, integral=integral).of(rows, more, length=length),
+            Kernel(own, K, ends, integral=integral).of(rows, more, length=length),
             size.mean(axis=0) * TS * (1 - 1e-3),
             0.02,
         )
-    coarse = Kernel(own, A, K, [ends[0], ends[-1]], integral=False)  # one chord, and how far it may be off
+    coarse = Kernel(own, K, [ends[0], ends[-1]])  # one chord, and how far it may be off
     assert (
         coarse.of(rows, length=length) >= size_of(rows @ phi @ K, length).mean(axis=0) * TS * (1 - 1e-3)
     ).all()

@@ -20,10 +20,9 @@ from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.expression.matrix import identity
 from tubecert.loop_design.design import Design, design
-from tubecert.loop_design.plant import Plant
+from tubecert.loop_design.plant import plant_of, space_of
 from tubecert.loop_design.proposal import propose
 from tubecert.loop_design.shares import explain
-from tubecert.loop_design.surrogate import fitted
 from tubecert.loop_design.unfound import NoDesign
 from tubecert.model import ControlAffineModel, build
 from tubecert.planner import propose as planner
@@ -38,10 +37,7 @@ from tubecert.trajectory.make import Room, plan_of
 from tubecert.verdict import Verdict
 
 _WINDOWS: Final = 256
-_FEW: Final = 48  # windows for a search
 _TRIES: Final = 4  # designs with ever less room, where a proof needs more than floats
-_SHARE: Final = 0.1  # of the safe set: where the remainder is fitted
-_ROOM: Final = 1.0  # of an input without limits, there
 
 
 def certify(spec: Spec, report: Progress | None = None) -> Certificate:
@@ -127,7 +123,7 @@ def _hopeless(remainders: Remainders) -> Iterator[Lack]:
     """What no controller could mend: a start outside of all that is allowed, a plan beyond the limits."""
     loop = remainders.loop
     wishes, limits = dict(loop.spec.tube.half_widths), dict(loop.spec.limits)
-    for name, reach, space in zip(loop.model.states, loop.start.reach, _space(remainders), strict=True):
+    for name, reach, space in zip(loop.model.states, loop.start.reach, space_of(remainders), strict=True):
         most = min(space, float(wishes.get(name, np.inf)))
         if reach >= most:
             yield Lack(kind="start", where=name, needed=float(reach), allowed=float(most))
@@ -152,42 +148,6 @@ def _tables(remainders: Remainders, narrow: Array, report: Progress | None) -> D
     n, m = loop.states, loop.inputs
     shapes = {"F": (0, 0), "G": (0, n), "M": (m, 0), "N": (m, n), "W": (n,), "U": (m,)}
     return Design(**{name: np.zeros(shape) for name, shape in shapes.items()}, evaluations=0)
-
-
-def plant_of(remainders: Remainders, narrow: Array) -> Plant:
-    """The error equation in floats, with `narrow` (m,) of the room that the inputs have."""
-    loop, winds = remainders.loop, remainders.loop.sudden
-    room = np.where(remainders.room > 0, remainders.room * narrow, 0.0)
-    sizes, asked = remainders.sizes(np.zeros(loop.states)), dict(loop.spec.tube.half_widths)
-    low, high = np.array(loop.spec.safe_set, dtype=float).T
-    reach = np.where(np.isfinite(room) & (room > 0), room, _ROOM)
-    return Plant(
-        A=loop.A,
-        B=loop.B,
-        H=loop.H,
-        E=np.hstack([loop.E[:, :0], *(columns for columns, _ in winds)]),
-        sample_time=float(loop.sample_time),
-        delay=float(loop.delay),
-        noise=loop.noise.each,
-        noise_ball=loop.noise.length,
-        magnitude=sizes.size,
-        rate=sizes.rate,
-        eta_start=sizes.first,
-        wind=np.concatenate([np.zeros(0), *(size.each for _, size in winds)]),
-        wind_ball=len(winds) == 1 and winds[0][1].length,
-        room=room,
-        wishes=np.array([float(asked.get(name, np.inf)) for name in loop.model.states]),
-        space=_space(remainders),
-        start=loop.start.reach,
-        remainder=fitted(Remainders(loop, _FEW), np.concatenate([_SHARE * (high - low), reach])),
-    )
-
-
-def _space(remainders: Remainders) -> Array:
-    """How far the plan is from the ends of the safe set, (n,)."""
-    low, high = np.array(remainders.loop.spec.safe_set, dtype=float).T
-    x = remainders.cells.x
-    return np.asarray(np.maximum(np.minimum(high - x.hi.max(axis=0), x.lo.min(axis=0) - low), 1e-300))
 
 
 def _result(loop: Loop) -> Result:

@@ -27,7 +27,6 @@ _PARTS: Final = (2, 4, 8, 16)
 _SETTLED: Final = 5e-3  # finer pieces that gain less are not worth it
 _SHORTER: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the lags, where they are enough
 _STEPS: Final = 200
-_LARGE: Final = 1e6
 _STEADY: Final = 0.9  # a long run that is not narrower than this of the tube is no stage of its own
 _STAGES: Final = (32, 8, 3, 1)
 _WIDER: Final = 1 + 1e-3

@@ -27,7 +27,7 @@ class Exponential:
     """Phi and J of one matrix of floats A (n, n) at exact times, each enclosed once."""
 
     def __init__(self, A: Array) -> None:
-        self._A = Known.exact(A)
+        self.A = Known.exact(A)
         self._one = Known.exact(np.eye(len(A)))
         self._norm = Fraction(float(np.max(np.abs(A).sum(axis=1), initial=0.0) * SUMMED))
         self._found = lru_cache(maxsize=None)(self._computed)
@@ -40,10 +40,10 @@ class Exponential:
         if self._norm * s > _MOST:
             phi, whole = self.at(s / 2)
             return phi @ phi, (self._one + phi) @ whole
-        step = self._A.times(s)
+        step = self.A.times(s)
         series = self._one
         for k in range(_TERMS, 0, -1):
             series = self._one + (step @ series).times(Fraction(1, k + 1))
         left = _E * float(_MOST) ** (_TERMS + 1) / factorial(_TERMS + 2) * (1 + 1e-12)
         whole = Known(series.mid, series.rad + left).times(s)
-        return self._one + self._A @ whole, Known(whole.mid, whole.rad + TINY)
+        return self._one + self.A @ whole, Known(whole.mid, whole.rad + TINY)

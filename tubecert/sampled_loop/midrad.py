@@ -61,6 +61,9 @@ class Known:
         """How many rows there are."""
         return int(self.mid.shape[0])
 
+    def __getitem__(self, index: tuple[slice, slice]) -> Known:
+        return Known(self.mid[index], self.rad[index])
+
     def __matmul__(self, other: Known) -> Known:
         if not self.mid.shape[-1]:  # a sum of no terms
             zero = np.zeros((self.rows, other.mid.shape[1]))

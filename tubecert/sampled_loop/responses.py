@@ -55,9 +55,9 @@ class Dynamics:
         self.loop, self.controller = loop, controller
         self.exponential = Exponential(loop.A)
         self.n, self.m, self.z, self.q = loop.states, loop.inputs, controller.size, loop.whole
-        self.A, self.B, self.H = Known.exact(loop.A), Known.exact(loop.B), Known.exact(loop.H)
+        self.A, self.B, self.H = map(Known.exact, (loop.A, loop.B, loop.H))
         self.core_size = self.n + self.z + self.m * (self.q + 1)
-        self._N, self._M = Known.exact(controller.N), Known.exact(controller.M)
+        self._N, self._M = map(Known.exact, (controller.N, controller.M))
 
     def held(self, s: Fraction) -> tuple[Known, Known]:
         """G0(s), of the newer input, and G1(s), of the older one, each (n, m)."""
@@ -88,33 +88,26 @@ class Dynamics:
         acting = self._assembled(Known.zero(self.n, self.n), newer, older, self.H)
         return Flow(*(self.A @ own + more for own, more in zip(self.flow(s), acting, strict=True)))
 
+    def _sample(self) -> Known:
+        """xi without eta at the next sample, by itself, eta, n, r_u and r_z: (a, a + r + n + m + z)."""
+        c, zero, past = self.controller, np.zeros, self.m * (self.q + 1)
+        n, m, z, held = self.n, self.m, self.z, past + self.loop.H.shape[1]
+        lower = [
+            [c.G, c.F, zero((z, held)), c.G, zero((z, m)), np.eye(z)],
+            [c.N, c.M, zero((m, held)), c.N, np.eye(m), zero((m, z))],
+            [zero((past - m, n + z)), np.eye(past - m, held + n + m + z)],
+        ]
+        upper = Known.stacked([[*self.flow(self.loop.sample_time), Known.zero(n, z)]])
+        return Known.stacked([[upper], [Known.exact(np.block(lower))]])
+
     def step(self) -> tuple[Known, Known]:
         """AA without eta, (a, a), and its column of eta, (a, r)."""
-        flow, c = self.flow(self.loop.sample_time), self.controller
-        past = self.m * (self.q + 1)
-        lower = np.block(
-            [
-                [c.G, c.F, np.zeros((self.z, past))],
-                [c.N, c.M, np.zeros((self.m, past))],
-                [np.zeros((past - self.m, self.n + self.z)), np.eye(past - self.m, past)],
-            ]
-        )
-        still = Known.zero(self.core_size - self.n, self.loop.H.shape[1])
-        return Known.stacked([[flow.core], [Known.exact(lower)]]), Known.stacked([[flow.eta], [still]])
+        whole, a = self._sample(), self.core_size
+        return whole[:, :a], whole[:, a : a + self.loop.H.shape[1]]
 
     def discrete(self) -> Known:
         """How n, r_u and r_z enter at a sample, (a, n + m + z)."""
-        flow, c = self.flow(self.loop.sample_time), self.controller
-        n, m, z = self.n, self.m, self.z
-        lower = np.block(
-            [
-                [c.G, np.zeros((z, m)), np.eye(z)],
-                [c.N, np.eye(m), np.zeros((m, z))],
-                [np.zeros((m * self.q, n + m + z))],
-            ]
-        )
-        upper = Known.stacked([[flow.noise, flow.rounding, Known.zero(n, z)]])
-        return Known.stacked([[upper], [Known.exact(lower)]])
+        return self._sample()[:, self.core_size + self.loop.H.shape[1] :]
 
     def outputs(self, nodes: Iterable[Fraction]) -> Flow:
         """The rows of e at every node of a sample, of delta, and of zeta."""
@@ -135,17 +128,17 @@ class Kernel:
     """
 
     def __init__(
-        self, exponential: Exponential, A: Array, K: Array, ends: Sequence[Fraction], *, integral: bool
+        self, own: Exponential, K: Array, ends: Sequence[Fraction], *, integral: bool = False
     ) -> None:
         self.columns = K.shape[1]
         self._at: list[tuple[float, Known]] = []
-        bent, own, columns = np.zeros_like(K), Known.exact(A), Known.exact(K)
+        bent, columns = np.zeros_like(K), Known.exact(K)
         for a, b in pairwise(ends):
             d = fraction_bounds(b - a)[1]
-            self._at += [(0.5 * d, exponential.at(s)[integral] @ columns) for s in (a, b)]
-            slope = own @ (exponential.at((a + b) / 2)[0] @ columns)
-            second = slope if integral else own @ slope
-            bent = bent + d**3 / 12 * (swelling(A, (b - a) / 2) @ second.above) * (1 + 1e-12)
+            self._at += [(0.5 * d, own.at(s)[integral] @ columns) for s in (a, b)]
+            slope = own.A @ (own.at((a + b) / 2)[0] @ columns)
+            second = slope if integral else own.A @ slope
+            bent = bent + d**3 / 12 * (swelling(own.A.mid, (b - a) / 2) @ second.above) * (1 + 1e-12)
         self._bent = bent * SUMMED
 
     def of(self, rows: Array, plus: Array | None = None, *, length: bool = False) -> Array:
@@ -171,9 +164,9 @@ class _Within:
         loop, own = dynamics.loop, dynamics.exponential
         parts = max(1, ceil(panels * until / loop.sample_time))
         ends = [until * k / parts for k in range(parts + 1)]
-        self._winds = [(Kernel(own, loop.A, K, ends, integral=False), size) for K, size in loop.sudden]
-        self._rho, self._size = (Kernel(own, loop.A, K, ends, integral=False) for K in (loop.R, loop.H))
-        self._rate = Kernel(own, loop.A, loop.H, ends, integral=True)
+        self._winds = [(Kernel(own, K, ends), size) for K, size in loop.sudden]
+        self._rho, self._size = (Kernel(own, K, ends) for K in (loop.R, loop.H))
+        self._rate = Kernel(own, loop.H, ends, integral=True)
 
     def of(self, rows: Array, eta: Array | None = None) -> tuple[Array, Array, Array, Array]:
         """For rows (N, n) of e, and (N, r) of eta: wind (N,), rho (N, n + m), rate (N, r), size (N, r)."""
@@ -200,12 +193,8 @@ class Responses:
         self.count = self._first.core.rows
         self.rows, self.eta, missed_core, missed_eta = self._free_rows()
         noise, rounding = self._first.noise.above, self._first.rounding.above
-        self.now = self._nothing(self.count)._replace(
-            noise=loop.noise.weigh(noise),
-            core=missed_core,
-            eta=missed_eta,
-            rounding=np.hstack([noise, rounding]),
-        )
+        now = {"noise": loop.noise.weigh(noise), "rounding": np.hstack([noise, rounding])}
+        self.now = self._nothing(self.count)._replace(core=missed_core, eta=missed_eta, **now)
         self._discrete, self._within = own.discrete(), _Within(own, Ts, panels)
         sums = zip(*map(self._entered, self._batches()), strict=True)
         self.noise, self.wind, self.rounding, self.rho, self.rate, self.size = map(self._cumulated, sums)

@@ -284,14 +284,11 @@ class Loop:
         """sup |x*_i' - F_i(x*, u*, p0)| while the plan moves, (n,)."""
         if isinstance(self.plan, Family):
             return np.full(self.states, fraction_bounds(self.plan.limit)[1])
-        domain, fixed = self.plan.domain, self.plan.fixed
-        rows = [row[0] for row in self.plan.defect(self.model)]
-        return np.array(
-            [
-                0.0 if e is ZERO else supremum(SumOfNorms([((e,),)], fixed), domain, _DEFECT).above
-                for e in rows
-            ]
-        )
+        found = np.zeros(self.states)
+        for i, (e,) in enumerate(self.plan.defect(self.model)):
+            if e is not ZERO:
+                found[i] = supremum(SumOfNorms([((e,),)], self.plan.fixed), self.plan.domain, _DEFECT).above
+        return found
 
     @cached_property
     def start(self) -> Start:
@@ -331,8 +328,7 @@ class Controller:
 
     def record(self) -> Tables:
         """The same as they are written."""
-        F, G, M, N = map(HexMatrix, (self.F, self.G, self.M, self.N))
-        return Tables(F=F, G=G, M=M, N=N)
+        return Tables(**{name: HexMatrix(getattr(self, name)) for name in "FGMN"})
 
     @property
     def size(self) -> int:
@@ -342,9 +338,7 @@ class Controller:
     def fits(self, loop: Loop) -> bool:
         """Whether the shapes agree and every entry is a number of single precision."""
         z, n, m = self.size, loop.states, loop.inputs
-        shapes = ((self.F, (z, z)), (self.G, (z, n)), (self.M, (m, z)), (self.N, (m, n)))
+        tables, shapes = (self.F, self.G, self.M, self.N), ((z, z), (z, n), (m, z), (m, n))
         with np.errstate(all="ignore"):
-            return all(
-                own.shape == shape and bool((own.astype(np.float32).astype(float) == own).all())
-                for own, shape in shapes
-            )
+            single = all(bool((own.astype(np.float32).astype(float) == own).all()) for own in tables)
+        return single and tuple(own.shape for own in tables) == shapes

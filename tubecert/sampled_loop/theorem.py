@@ -37,9 +37,7 @@ from tubecert.verdict import Verdict
 MOST_LAGS: Final = 50_000
 MOST_PARTS: Final = 64
 _CAREFUL: Final = Effort(budget=200_000)
-_FLUSHED: Final = (
-    1e-35  # what a computer may lose that has no subnormal numbers, z + n <= 400 products and sums
-)
+_FLUSHED: Final = 1e-35  # lost without subnormal numbers, in z + n <= 400 products and sums
 _DIGITS: Final = 7
 _INDEX = NDArray[np.intp]
 
@@ -83,9 +81,9 @@ class Phase(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Inequalities:
-    """All b_o(k) of one loop, controller and recipe, for any tube: it is monotone in the tube.
+    """All b_o(k) of one loop, controller and recipe, for any tube whose stages begin at samples `starts`.
 
-    They are those of a controller and a recipe, for stages that begin at samples `starts`.
+    They are monotone in the tube.
     """
 
     controller: Controller
@@ -100,9 +98,8 @@ class Inequalities:
     ) -> Inequalities:
         """Those of the loop of `remainders`."""
         sizes = {"lags": recipe.lags, "pieces": recipe.pieces, "panels": recipe.panels}
-        return cls(
-            controller, recipe, tuple(starts), Responses(remainders.loop, controller, **sizes), remainders
-        )
+        made = Responses(remainders.loop, controller, **sizes)
+        return cls(controller, recipe, tuple(starts), made, remainders)
 
     @property
     def loop(self) -> Loop:
@@ -133,7 +130,11 @@ class Inequalities:
         (phases, sizes), off = self.phases(boxes), self._rounding(boxes)
         k = np.arange(self.last + 1)
         lag = np.minimum(k, own.lags)
-        widest = phases[0]._replace(core=np.max([self._begins, *(phase.core for phase in phases)], axis=0))
+        boxes_of_xi = np.array([phase.core for phase in phases])
+        begins = np.pad(
+            self.loop.start.reach, (0, boxes_of_xi.shape[1] - self.loop.states)
+        )  # 0 at boot: zeta, v
+        widest = phases[0]._replace(core=np.maximum(boxes_of_xi.max(axis=0), begins))
         constant = own.noise + own.wind + total(own.rounding, off)
         b = widest.met(own.now) + constant[lag] + self.slow(sizes) + self.first(k) + self._tail(phases, k)
         starts = [phase.start for phase in phases]
@@ -179,11 +180,6 @@ class Inequalities:
         state = gamma * (total(np.abs(c.F), Z) + total(np.abs(c.G), seen)) + _FLUSHED
         return np.concatenate([y, delta, state]) * SUMMED
 
-    @property
-    def _begins(self) -> Array:
-        """The box of xi(0) without eta: zeta and what has been sent are 0 at boot."""
-        return np.pad(self.loop.start.reach, (0, self.responses.dynamics.core_size - self.loop.states))
-
     def slow(self, sizes: Sizes) -> Array:
         """eta by its rate up to the cut, and by its size from there on (D-cut), (K, R)."""
         rate, first, size = self._cut_apart
@@ -197,7 +193,7 @@ class Inequalities:
         about = [
             *np.tile(np.arange(n), len(own.nodes)),
             *range(n, len(cuts)),
-        ]  # which of e, delta, zeta a row is
+        ]  # of e, delta, zeta in each row
         cut = np.array(cuts, dtype=np.intp).reshape(len(cuts), r)[about]
         lag = np.minimum(k, own.lags)
         rows, column = np.arange(R)[None, :, None], np.arange(r)[None, None]
