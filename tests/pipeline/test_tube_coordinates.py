@@ -11,12 +11,12 @@ from tubecert.certificate.result import Result
 from tubecert.claims.tube import TubeInSafeSet
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
+from tubecert.simulate.attack import cases
 from tubecert.simulate.compare import compare
+from tubecert.simulate.engine import integrate
 from tubecert.simulate.fast import generator
 from tubecert.simulate.grid import fast_part
-from tubecert.simulate.integrator import integrate
 from tubecert.simulate.layout import slices
-from tubecert.simulate.monte_carlo import case, disturbance_of
 from tubecert.simulate.setting import setting_of
 from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.spec import load, load_text
@@ -208,14 +208,7 @@ def test_simulations_stay_within_what_is_certified(tube):
     setting = setting_of(spec, result)
     for source in ("26", "distance"):
         loop = loop_of(setting, "l1", Choice(source=source))
-        cases = [case(setting, setting.uncertainty, 0, number) for number in range(6)]
-        starts = np.array([each.start for each in cases])
-        runs = integrate(
-            loop.problem,
-            starts,
-            disturbance_of(setting, setting.uncertainty, cases),
-            tolerance=setting.tolerance,
-        )
+        (runs,) = integrate([cases(setting, 0, range(6)).of(loop.problem)], tolerance=setting.tolerance)
         found = compare(setting, runs, loop.promise)
         assert not found.violations
         assert not found.outside

@@ -11,9 +11,10 @@ from typer.testing import CliRunner
 
 from tubecert.certificate import dump, seal
 from tubecert.cli.app import app
+from tubecert.simulate import attack, engine
 from tubecert.simulate import campaign as campaigns
 from tubecert.simulate import figures as drawing
-from tubecert.simulate import monte_carlo as sampling
+from tubecert.simulate.attack import cases
 from tubecert.simulate.tuning import Choice, loop_of
 
 pytestmark = pytest.mark.timeout(240)  # the first run compiles
@@ -125,35 +126,61 @@ def test_a_broken_promise_is_loud_and_can_be_replayed(files):
     assert worst == pytest.approx(next(iter(named.values())), rel=1e-3)
 
 
+@pytest.fixture
+def quick(monkeypatch):
+    """No evolution: the first random adversary."""
+    monkeypatch.setattr(campaigns, "worst", lambda where, loop, seed, report: cases(where, seed, [0]))
+
+
 @pytest.mark.slow
-def test_runs_do_not_depend_on_their_batches(monkeypatch):
+def test_runs_do_not_depend_on_how_many_there_are_and_how_they_are_grouped(monkeypatch, quick):
     where = setting("flat", duration="2")
-    loop = loop_of(where, "l1", Choice())
-    whole = sampling.monte_carlo(where, loop, 7, seed=5)
-    monkeypatch.setattr(sampling, "BATCH", 3)
-    parts = sampling.monte_carlo(where, loop, 7, seed=5)
-    np.testing.assert_array_equal(whole.runs.x, parts.runs.x)
-    np.testing.assert_array_equal(whole.runs.worst.distance.value, parts.runs.worst.distance.value)
+    loops = [loop_of(where, "l1", Choice())]
+    whole = campaigns.simulate(where, loops, count=7, seed=5).attacks[0].sample
+    monkeypatch.setattr(campaigns, "LANES", 3)
+    parts = campaigns.simulate(where, loops, count=5, seed=5).attacks[0].sample
+    np.testing.assert_array_equal(whole.cases.start[:5], parts.cases.start)
+    np.testing.assert_array_equal(whole.runs.x[:5], parts.runs.x)
+    np.testing.assert_array_equal(whole.runs.worst.distance.value[:5], parts.runs.worst.distance.value)
 
 
-@pytest.mark.slow
-def test_interruption_keeps_what_is_finished(files, monkeypatch):
-    monkeypatch.setattr(sampling, "BATCH", 2)
-    real, calls = sampling.integrate, []
+def interrupted_at(monkeypatch, call):
+    """The engine is interrupted when it is called for the so-manieth time."""
+    real, calls = engine.integrate, []
 
     def integrate(*arguments, **options):
         calls.append(1)
-        if len(calls) == 3:
+        if len(calls) == call:
             raise KeyboardInterrupt
         return real(*arguments, **options)
 
-    monkeypatch.setattr(sampling, "integrate", integrate)
+    for module in (campaigns, attack):
+        monkeypatch.setattr(module, "integrate", integrate)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("call", "runs"), [(2, 2), (3, 4), (6, 9), (8, 9), (10, 9)])
+def test_interruption_keeps_what_is_finished(files, monkeypatch, call, runs):
+    """Of five vectors with two runs each, of the four rounds of the adversary, and of its own run."""
+    monkeypatch.setattr(campaigns, "LANES", 2)
+    monkeypatch.setattr(attack, "_POPULATION", 4)
+    interrupted_at(monkeypatch, call)
     result = command("--runs", "9")
     assert result.exit_code == 130, result.output
     data = json.loads((files / "flat.simulation" / "summary.json").read_text())
     assert data["outcome"] == "interrupted"
-    assert (data["attacks"][0]["random"]["runs"], data["attacks"][0]["random"]["asked"]) == (4, 9)
-    assert "4 of 9" in result.stdout
+    (found,) = data["attacks"]
+    assert (found["random"]["runs"], found["random"]["asked"]) == (runs, 9)
+    assert found.get("adversary") is None
+    assert [loop["runs"] for loop in data["loops"]] == [1, 1]
+    assert f"{runs} of 9" in result.stdout or runs == 9
+
+
+@pytest.mark.slow
+def test_an_interruption_before_anything_is_finished_leaves_nothing(files, monkeypatch):
+    interrupted_at(monkeypatch, 1)
+    assert command("--runs", "9").exit_code == 130
+    assert not (files / "flat.simulation").exists()
 
 
 @pytest.mark.slow
@@ -177,11 +204,9 @@ def test_a_folder_that_stays_empty_does_not_stay(files):
 
 @pytest.mark.slow
 def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
-    real = campaigns.integrate
-
-    def coarse(*arguments, **options):
-        found = real(*arguments, **options)
-        return replace(found, error=np.full_like(found.error, 0.02 * setting("flat").rho))
+    def coarse(batches, **options):
+        error = np.full(1, 0.02 * setting("flat").rho)
+        return [replace(found, error=error) for found in engine.integrate(batches, **options)]
 
     monkeypatch.setattr(campaigns, "integrate", coarse)
     result = command("--runs", "0")
@@ -257,22 +282,3 @@ def test_geodesics_are_cubic_where_the_metric_hardly_varies_over_the_tube():
     assert degrees == [3, 5]
     unknown = replace(own, certified=replace(own.certified, upper=None))
     assert loop_of(unknown, "ccm", Choice()).problem.degree == 5
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("most", [1, 10**6])
-def test_a_loop_that_takes_many_steps_is_attacked_with_less_accurate_runs(monkeypatch, most):
-    asked = []
-
-    def attacked(setting, loop, *rest):
-        asked.append(setting)
-        return campaigns.Attack(
-            loop=loop, sample=None, comparison=None, worst=None, case=None, worst_comparison=None
-        )
-
-    monkeypatch.setattr(campaigns, "_DEAR", most)
-    monkeypatch.setattr(campaigns, "_attack", attacked)
-    own = setting("flat")
-    campaigns.simulate(own, [loop_of(own, "l1", Choice())], count=1, seed=0)
-    assert [each.dear for each in asked] == [most == 1]
-    assert asked[0].tolerance == pytest.approx((5e-3 if most == 1 else 1e-3) * own.rho)

@@ -10,10 +10,11 @@ from scipy.integrate import solve_ivp
 from simulated import FLAT
 from systems import SMALL
 
+from tubecert.simulate import engine
+from tubecert.simulate.attack import cases
 from tubecert.simulate.campaign import simulate
 from tubecert.simulate.compare import compare
 from tubecert.simulate.integrator import integrate
-from tubecert.simulate.monte_carlo import monte_carlo
 from tubecert.simulate.problem import Disturbance
 from tubecert.simulate.setting import setting_of
 from tubecert.simulate.tuning import Choice, loop_of
@@ -69,13 +70,14 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
 @pytest.mark.slow
 def test_no_bound_is_exceeded_by_adversaries_whose_parameters_differ():
     setting, own = stirred("B"), loop("B")
-    sample = monte_carlo(setting, own, 60, 3)
-    found = compare(setting, sample.runs, own.promise)
+    drawn = cases(setting, 3, range(60))
+    (runs,) = engine.integrate([drawn.of(own.problem)], tolerance=setting.tolerance)
+    found = compare(setting, runs, own.promise)
     assert own.promise is not None
     assert not found.violations
     assert not found.outside
     assert not found.failures
-    thetas = np.array([case.member.beside.theta[0] for case in sample.cases])
+    thetas = drawn.h.beside.theta
     assert thetas.shape == (60, 2)
     assert np.all((thetas >= [0.28, -0.02]) & (thetas <= [0.32, 0.02]))
     assert len(np.unique(thetas[:, 0])) > 3

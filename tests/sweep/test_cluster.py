@@ -22,7 +22,8 @@ from tubecert.enclosure.objective import SumOfNorms
 from tubecert.executor import Cluster, Serial, WorkerError
 from tubecert.expression import parse, symbol
 from tubecert.libraries import versions
-from tubecert.simulate import monte_carlo
+from tubecert.simulate import campaign
+from tubecert.simulate.attack import cases
 from tubecert.simulate.tuning import Choice, loop_of
 from tubecert.trajectory import constant_plan
 from tubecert.tube import Tube
@@ -145,13 +146,15 @@ def test_where_there_is_no_cluster_that_is_said(monkeypatch):
 
 
 def test_random_runs_on_a_cluster_are_those_of_this_machine(cluster, monkeypatch):
-    monkeypatch.setattr(monte_carlo, "BATCH", 2)
+    monkeypatch.setattr(campaign, "LANES", 2)
+    monkeypatch.setattr(campaign, "worst", lambda where, loop, seed, report: cases(where, seed, [0]))
     where = setting("flat", duration="1")
-    loop = loop_of(where, "l1", Choice())
+    loops = [loop_of(where, "l1", Choice())]
     here, there = (
-        monte_carlo.monte_carlo(where, loop, 7, 5, executor=each) for each in (Serial(), Cluster(cluster[0]))
+        campaign.simulate(where, loops, count=7, seed=5, executor=each).attacks[0].sample
+        for each in (Serial(), Cluster(cluster[0]))
     )
-    assert [each.start.tolist() for each in here.cases] == [each.start.tolist() for each in there.cases]
+    np.testing.assert_array_equal(here.cases.start, there.cases.start)
     np.testing.assert_array_equal(here.runs.x, there.runs.x)
     np.testing.assert_array_equal(here.runs.worst.distance.value, there.runs.worst.distance.value)
 

@@ -6,6 +6,7 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | module | what it does |
 |---|---|
 | `problem`, `loops`, `runs` | what is simulated, the terms of the loops, and what comes out |
+| `engine` | batches of lanes |
 | `integrator` | steps are halved until the error estimate is small enough; lanes on all cores |
 | `grid` | the times of the steps, the plan at them, and the fast part's exact steps |
 | `program` | expressions as arrays for one compiled interpreter |
@@ -18,7 +19,7 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `setting` | plan, times, starts and loops with their gains, certified or chosen |
 | `members` | random plans of a family |
 | `uncertainty` | random members and adversaries of the certified class |
-| `monte_carlo`, `campaign` | many runs and the search for the worst; all that one command simulates |
+| `attack`, `campaign` | random runs and the search for the worst; all that one command simulates |
 | `compare`, `clearance` | runs against promises; distances from obstacles |
 | `summary`, `output` | a campaign as data and files |
 | `figures`, `figures_plane`, `figures_style` | figures over time, in a plane of states; their lines and names |

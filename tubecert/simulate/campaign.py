@@ -1,6 +1,7 @@
 """All that one command simulates: every loop under the uncertainty that is drawn, then attacks on the loops that adapt.
 
-Interruption keeps what is finished; `interrupted` says that something is missing.
+Loops and random runs are one vector of lanes, or several where there are many. Interruption keeps what is finished;
+`interrupted` says that something is missing.
 """
 
 from __future__ import annotations
@@ -8,35 +9,38 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
+from itertools import islice, takewhile
 from typing import Final
 
 import numpy as np
 
-from tubecert.enclosure.interval import Array
 from tubecert.executor import Executor, Serial
 from tubecert.progress import Phase, Progress, Step
+from tubecert.simulate.attack import Cases, cases, worst
 from tubecert.simulate.clearance import Clearance, of_curve, of_tube
 from tubecert.simulate.compare import Comparison, check_class, compare, merged
-from tubecert.simulate.integrator import integrate
-from tubecert.simulate.monte_carlo import (
-    Case,
-    Sample,
-    along,
-    attack,
-    case,
-    disturbance_of,
-    monte_carlo,
-)
+from tubecert.simulate.engine import integrate
 from tubecert.simulate.problem import Disturbance
-from tubecert.simulate.runs import Runs
+from tubecert.simulate.runs import Runs, joined
 from tubecert.simulate.setting import Loop, Setting
 from tubecert.simulate.uncertainty import usual
 from tubecert.trajectory import Plan
 
-_HERE: Final = Serial()
-_DEAR: Final = 60_000  # steps of a run
+LANES: Final = 128  # random runs of a vector: they are kept, and told of, when all of them are finished
+PLANS: Final = 25  # random plans whose runs are one vector
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
+_HERE: Final = Serial()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sample:
+    """Random runs of a loop and their cases, in the order of their numbers; `asked` is how many there were to be."""
+
+    runs: Runs
+    cases: Cases
+    asked: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,14 +55,14 @@ class Drawn:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Attack:
-    """What random runs and the adversary found against a loop; the adversary's run is alone in `worst`."""
+    """What random runs and the adversary found against a loop; the adversary's run is alone in `worst` and `case`."""
 
     loop: Loop
-    sample: Sample | None
-    comparison: Comparison | None
-    worst: Runs | None
-    case: Case | None
-    worst_comparison: Comparison | None
+    sample: Sample
+    comparison: Comparison
+    worst: Runs | None = None
+    case: Cases | None = None
+    worst_comparison: Comparison | None = None
 
     @property
     def greatest(self) -> float:
@@ -155,36 +159,35 @@ def simulate(
 ) -> Campaign:
     """Every loop once, and `count` random runs and an adversary against each loop that adapts (none if 0).
 
-    A loop whose own run is no result is not attacked: neither would the others be.
-
-    Random runs are done by the `executor`. The loops are drawn under the specification's h, or as random run `replay`.
-    Raises `TubecertError` if the specification's h leaves its class while the state is in the tube.
+    Vectors of lanes are done by the `executor`. The loops are drawn under the specification's h, or as random run
+    `replay`. No adversary is sought where a loop's own run is no result: neither would its runs be. Raises
+    `TubecertError` if the specification's h leaves its class while the state is in the tube.
     """
     if setting.h is None and replay is None:
         replay = 0
-    words = SPECIFIED if replay is None else RANDOM.format(run=replay, seed=seed)
-    drawn = []
-    for number, loop in enumerate(loops):
-        if report is not None:
-            name = f"{loop.controller}, {words}"
-            report(Step(phase=Phase.SIMULATION, name=name, done=number, of=len(loops)))
-        drawn.append(_drawn(setting, loop, *_uncertainty(setting, loop, seed, replay)))
+    own = _specified(setting) if replay is None else cases(setting, seed, [replay])
+    tested = [loop for loop in loops if loop.tested] if count else []
+    numbers = range(count if tested else 0)
+    vectors = [numbers[first : first + LANES] for first in range(0, max(1, len(numbers)), LANES)]
+    found = _found(partial(_vector, setting, loops, own, seed), vectors, report, executor)
+    parts, complete = [runs[len(runs) - len(tested) :] for runs in found], len(found) == len(vectors)
+    drawn = [_drawn(setting, loop, runs) for loop, runs in zip(loops, found[0], strict=False)]
     if setting.h is not None and replay is None:
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
             check_class(setting, item.runs, setting.h, where)
-    attacks: list[Attack] = []
-    interrupted = False
-    for loop, own in zip(loops, drawn, strict=True):
-        if loop.tested and count and not interrupted and not own.comparison.unreliable:
-            attacked = replace(setting, dear=bool(own.runs.steps.max() > _DEAR))
-            attacks.append(_attack(attacked, loop, count, seed, report, executor))
-            sample = attacks[-1].sample
-            interrupted = sample is None or sample.interrupted or attacks[-1].worst is None
+    lost = [item.loop for item in drawn if item.comparison.unreliable]
+    attacks = []
+    for loop, *sample in zip(tested, *parts, strict=True):
+        attack = _sampled(setting, loop, joined(sample), count, seed)
+        if complete and loop not in lost:
+            attack = _attacked(setting, attack, seed, report)
+            complete = attack.worst is not None
+        attacks.append(attack)
     first = drawn[0].runs
     return Campaign(
         setting=setting,
-        uncertainty=words,
+        uncertainty=SPECIFIED if replay is None else RANDOM.format(run=replay, seed=seed),
         drawn=tuple(drawn),
         attacks=tuple(attacks),
         plan_clearance=of_curve(setting.spec, first.t, first.x_plan),
@@ -193,8 +196,80 @@ def simulate(
         ),
         count=count,
         seed=seed,
-        interrupted=interrupted,
+        interrupted=not complete,
     )
+
+
+def _specified(setting: Setting) -> Cases:
+    """Start and h of the specification."""
+    start = setting.started(np.ones(len(setting.x0))) if setting.varied else setting.x0
+    own = Disturbance.from_expressions(setting.h, setting.model, 1)
+    if setting.uncertainty.sources is not None:
+        own = replace(own, beside=usual(setting.uncertainty))
+    return Cases(start[None], own)
+
+
+def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numbers: range) -> list[Runs]:
+    """Some random runs of every loop that adapts; before the first of them those of all loops that are drawn."""
+    drawn = [own.of(loop.problem) for loop in loops if not numbers.start]
+    random = [cases(setting, seed, numbers).of(loop.problem) for loop in loops if loop.tested and numbers]
+    found = integrate(drawn + random, tolerance=setting.tolerance)
+    return [*found[: len(drawn)], *map(_slim, found[len(drawn) :])]
+
+
+def _slim(runs: Runs) -> Runs:
+    """Runs without what only drawings need: many of them fit into memory."""
+    names = ("k", "u_a", "sigma_hat", "h", "xtilde")
+    return replace(runs, **{name: getattr(runs, name)[:, :0] for name in names})
+
+
+def _found(
+    work: partial[list[Runs]], vectors: list[range], report: Progress | None, executor: Executor
+) -> list[list[Runs]]:
+    """The runs of all vectors; of an interruption those before the first one that is missing, if there are any."""
+    found: dict[int, list[Runs]] = {}
+
+    def tell(done: int) -> None:
+        if report is not None:
+            name = "loops and random runs"
+            report(Step(phase=Phase.SIMULATION, name=name, done=done, of=sum(map(len, vectors))))
+
+    def ready(place: int, runs: list[Runs]) -> None:
+        found[place] = runs
+        tell(sum(len(vectors[each]) for each in found))
+
+    tell(0)
+    try:
+        executor.map(work, vectors, ready)
+    except KeyboardInterrupt:
+        if 0 not in found:
+            raise
+    return [found[place] for place in takewhile(found.__contains__, range(len(vectors)))]
+
+
+def _drawn(setting: Setting, loop: Loop, runs: Runs) -> Drawn:
+    return Drawn(
+        loop=loop,
+        runs=runs,
+        comparison=compare(setting, runs, loop.promise),
+        clearance=of_curve(setting.spec, runs.t, runs.x[0]),
+    )
+
+
+def _sampled(setting: Setting, loop: Loop, runs: Runs, count: int, seed: int) -> Attack:
+    sample = Sample(runs=runs, cases=cases(setting, seed, range(runs.lanes)), asked=count)
+    return Attack(loop=loop, sample=sample, comparison=compare(setting, runs, loop.promise))
+
+
+def _attacked(setting: Setting, attack: Attack, seed: int, report: Progress | None) -> Attack:
+    """With the adversary's run, if nobody interrupts."""
+    try:
+        found = worst(setting, attack.loop, seed, report)
+        (runs,) = integrate([found.of(attack.loop.problem)], tolerance=setting.tolerance)
+    except KeyboardInterrupt:
+        return attack
+    measured = compare(setting, runs, attack.loop.promise)
+    return replace(attack, worst=runs, case=found, worst_comparison=measured)
 
 
 def follow(
@@ -215,17 +290,12 @@ def follow(
     defects: list[float] = []
     tested = [loop for loop in loops if loop.tested]
     try:
-        for number, (plan, defect) in enumerate(plans, start=1):
+        while part := [*islice(plans, PLANS)]:
             if report is not None:
-                name = "random plans of the family"
-                report(Step(phase=Phase.SIMULATION, name=name, done=(number - 1) * each, of=asked * each))
-            around = setting.along(plan)
-            numbers = range(number * each, (number + 1) * each)
-            runs = [along(around, loop.along(plan), seed, numbers) for loop in tested]
-            found.append(
-                tuple(compare(around, own, loop.promise) for own, loop in zip(runs, tested, strict=True))
-            )
-            defects.append(defect)
+                name, done = "random plans of the family", len(found) * each
+                report(Step(phase=Phase.SIMULATION, name=name, done=done, of=asked * each))
+            found += _along(setting, tested, [plan for plan, _ in part], seed, each, len(found) + 1)
+            defects += [defect for _, defect in part]
     except KeyboardInterrupt:
         pass
     if not found:
@@ -236,50 +306,22 @@ def follow(
         each=each,
         defect=max(defects),
         followed=tuple(
-            Followed(loop=loop, comparison=merged([row[i] for row in found])) for i, loop in enumerate(tested)
+            Followed(loop=loop, comparison=merged(rows)) for loop, *rows in zip(tested, *found, strict=True)
         ),
     )
 
 
-def _uncertainty(setting: Setting, loop: Loop, seed: int, replay: int | None) -> tuple[Array, Disturbance]:
-    """Start (n,) and h of the run that is drawn: the specification's own, or those of a random run."""
-    kind = setting.uncertainty
-    if replay is not None:
-        found = case(setting, kind, seed, replay)
-        return found.start, disturbance_of(setting, kind, [found])
-    start = setting.started(np.ones(len(setting.x0))) if setting.varied else setting.x0
-    own = Disturbance.from_expressions(setting.h, setting.model, 1)
-    return start, own if kind.sources is None else replace(own, beside=usual(kind, kind.sources))
-
-
-def _drawn(setting: Setting, loop: Loop, start: Array, h: Disturbance) -> Drawn:
-    runs = integrate(loop.problem, start[None], h, tolerance=setting.tolerance)
-    return Drawn(
-        loop=loop,
-        runs=runs,
-        comparison=compare(setting, runs, loop.promise),
-        clearance=of_curve(setting.spec, runs.t, runs.x[0]),
-    )
-
-
-def _attack(
-    setting: Setting, loop: Loop, count: int, seed: int, report: Progress | None, executor: Executor
-) -> Attack:
-    sample = monte_carlo(setting, loop, count, seed, report, executor)
-    found, worst, measured = None, None, None
-    if sample is not None and not sample.interrupted:
-        try:
-            found = attack(setting, loop, seed, report)
-            one = disturbance_of(setting, setting.uncertainty, [found])
-            worst = integrate(loop.problem, found.start[None], one, tolerance=setting.tolerance)
-            measured = compare(setting, worst, loop.promise)
-        except KeyboardInterrupt:
-            found, worst = None, None
-    return Attack(
-        loop=loop,
-        sample=sample,
-        comparison=None if sample is None else compare(setting, sample.runs, loop.promise),
-        worst=worst,
-        case=found,
-        worst_comparison=measured,
-    )
+def _along(
+    setting: Setting, loops: Sequence[Loop], plans: Sequence[Plan], seed: int, each: int, first: int
+) -> list[tuple[Comparison, ...]]:
+    """Every loop along every plan, the first of which has this number."""
+    around = [setting.along(plan) for plan in plans]
+    drawn = [
+        cases(own, seed, range(number * each, (number + 1) * each))
+        for number, own in enumerate(around, first)
+    ]
+    pairs = [(own, loop, case) for own, case in zip(around, drawn, strict=True) for loop in loops]
+    batches = [case.of(loop.along(own.plan).problem) for own, loop, case in pairs]
+    runs = integrate(batches, tolerance=setting.tolerance)
+    seen = [compare(own, found, loop.promise) for (own, loop, _), found in zip(pairs, runs, strict=True)]
+    return [*zip(*[iter(seen)] * len(loops), strict=True)]

@@ -167,14 +167,14 @@ def _tube_use(campaign: Campaign) -> Figure:
 
 def _monte_carlo(campaign: Campaign) -> Figure | None:
     """How the runs of a sample are spread over the tube, over time."""
-    attacks = [(item, item.sample) for item in campaign.attacks if item.sample is not None]
+    attacks = campaign.attacks
     if not attacks:
         return None
     setting = campaign.setting
     figure = blank(7.0, 0.8 + 2.8 * len(attacks))
     axes = figure.subplots(len(attacks), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, (attack, sample) in zip(axes, attacks, strict=True):
-        runs, color = sample.runs, COLORS[attack.loop.controller]
+    for axis, attack in zip(axes, attacks, strict=True):
+        runs, color = attack.sample.runs, COLORS[attack.loop.controller]
         share = runs.distance / setting.reach
         alive = ~np.isnan(share).all(axis=0)
         t, share = runs.t[alive], share[:, alive]

@@ -35,8 +35,7 @@ def _files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     for item in campaign.drawn:
         yield f"{item.loop.controller}.csv", _table(*_drawn_table(campaign, item))
     for attack in campaign.attacks:
-        if attack.sample is not None:
-            yield f"monte_carlo_{attack.loop.controller}.csv", _table(*_sample_table(campaign, attack))
+        yield f"monte_carlo_{attack.loop.controller}.csv", _table(*_sample_table(campaign, attack))
     if not campaign.interrupted:
         yield from figures(campaign)
 
@@ -50,15 +49,14 @@ def _arrays(campaign: Campaign) -> dict[str, Array]:
         prefix = attack.loop.controller
         if attack.worst is not None:
             arrays |= _named(f"{prefix}_adversary", attack.worst)
-        if attack.sample is not None:
-            runs = attack.sample.runs
-            arrays |= {
-                f"{prefix}_sample_t": runs.t,
-                f"{prefix}_sample_distance": runs.distance,
-                f"{prefix}_sample_x": runs.x,
-                f"{prefix}_sample_error": runs.error,
-                f"{prefix}_sample_start": np.array([case.start for case in attack.sample.cases]),
-            }
+        runs = attack.sample.runs
+        arrays |= {
+            f"{prefix}_sample_t": runs.t,
+            f"{prefix}_sample_distance": runs.distance,
+            f"{prefix}_sample_x": runs.x,
+            f"{prefix}_sample_error": runs.error,
+            f"{prefix}_sample_start": attack.sample.cases.start,
+        }
     return arrays
 
 
@@ -92,7 +90,6 @@ def _drawn_table(campaign: Campaign, item: Drawn) -> tuple[list[str], Array]:
 
 def _sample_table(campaign: Campaign, attack: Attack) -> tuple[list[str], Array]:
     """One row for each run: what it used of the tube, and when."""
-    assert attack.sample is not None
     runs, setting = attack.sample.runs, campaign.setting
     worst = runs.worst
     columns = {

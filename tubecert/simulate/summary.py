@@ -117,28 +117,23 @@ def _attack(item: Attack, setting: Setting) -> AttackData:
     )
 
 
-def _random(item: Attack) -> RandomData | None:
-    if item.sample is None or item.comparison is None:
-        return None
+def _random(item: Attack) -> RandomData:
     return RandomData(asked=item.sample.asked, comparison=_comparison(item.comparison))
 
 
 def _adversary(item: Attack, setting: Setting) -> AdversaryData | None:
     if item.case is None or item.worst_comparison is None:
         return None
-    member = item.case.member
-    beside = None if member.beside is None else member.beside._asdict()
+    start, h = item.case
+    beside = {name: part[0].tolist() for name, part in h.beside._asdict().items()}
+    waves = {
+        name: getattr(h, name)[0].tolist() for name in ("amplitude", "frequency", "wave", "phase", "push")
+    }
     return AdversaryData(
         comparison=_comparison(item.worst_comparison),
-        start=item.case.start.tolist(),
-        h=WaveData(
-            amplitude=member.amplitude.tolist(),
-            frequency=member.frequency.tolist(),
-            wave=(member.wave @ setting.S).tolist(),
-            phase=member.phase.tolist(),
-            push=member.push,
-        ),
-        beside=None if beside is None else {name: part[0].tolist() for name, part in beside.items()},
+        start=start[0].tolist(),
+        h=WaveData(**waves),
+        beside=beside if setting.uncertainty.sources else None,
     )
 
 

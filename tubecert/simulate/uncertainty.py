@@ -6,13 +6,14 @@ a_k sin(w_k t + q_k'(x - centre) + p_k) has |h| <= sum |a_k|, |h_x| <= sum |a_k|
 An adversary is a triangular wave in w t + q'(x - centre) + p: it moves as fast as the class allows all the time, and a
 filter of bandwidth omega misses of h what it moves within 1/omega. Its Fejer mean is used, which has the bounds of the
 triangle: slope at most 1, and no overshoot. Where metric and inputs are constant, a part of h may push along B'M g_s.
+
+Genes (N, G) in [0, 1] describe N members, one for each lane, and what acts beside them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,11 @@ from tubecert.simulate.problem import Beside, Disturbance, nothing_beside
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
 _ROUND: Final = 1 - 1e-9  # sums of floats stay within the class
+_UNEVEN: Final = 1.5  # a power: shares of h among the waves of a random member
+_FAINT: Final = 0.3  # of the random members use only a part of |h|
+_HALVINGS: Final = 60  # until a start is what |h(0, x(0))| allows
+_TINY: Final = float(np.finfo(float).tiny)
+_NOWHERE: Final = 1 - 1e-9  # twice the genes that have no direction: none has them
 _STEADY: Final = 0.2  # below, a wind never turns round
 _ENDS: Final = 1.6  # parameters lie at the ends of their ranges in 3 of 8 cases
 
@@ -47,6 +53,21 @@ class Class:
         """s1 = Dht + Dhx Y, how fast h moves along a loop of the speed Y."""
         return self.h_t + self.h_x * speed
 
+    @property
+    def adversary(self) -> int:
+        """How many genes describe an adversary."""
+        return 4 + self.n + self.m
+
+    @property
+    def member(self) -> int:
+        """How many describe a random member."""
+        return 6 + WAVES * (4 + self.n + self.m)
+
+    @property
+    def beside(self) -> int:
+        """How many describe wind and unknown parameters."""
+        return 0 if self.sources is None else 3 + self.sources.k + len(self.sources.ranges)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sources:
@@ -58,22 +79,14 @@ class Sources:
     ranges: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Member:
-    """One h: amplitude (W, m), frequency (W,), wave (W, n), phase (W,), push; and what acts beside it, as one lane."""
+class Waves(NamedTuple):
+    """N members: amplitude (N, W, m), frequency (N, W), wave (N, W, n), phase (N, W) and push (N,)."""
 
     amplitude: Array
     frequency: Array
     wave: Array
     phase: Array
-    push: float = 0.0
-    beside: Beside | None = None
-
-    def bounds(self) -> tuple[float, float, float]:
-        """Bounds of |h|, |h_x| and |h_t| of a sum of waves, by the triangle inequality."""
-        size = np.linalg.norm(self.amplitude, axis=1)
-        slope = np.linalg.norm(self.wave, axis=1)
-        return float(size.sum()), float(size @ slope), float(size @ np.abs(self.frequency))
+    push: Array
 
 
 def class_of(certified: Certified, n: int = 0, m: int = 0, sources: Sources | None = None) -> Class:
@@ -87,60 +100,33 @@ def class_of(certified: Certified, n: int = 0, m: int = 0, sources: Sources | No
     return Class(**constants, n=n, m=m, push=push, sources=sources)
 
 
-def random_member(kind: Class, x0: Array, centre: Array, rng: np.random.Generator) -> Member:
-    """A random member; often, but not always, at the limits of the class."""
-    sizes = rng.dirichlet(np.full(WAVES, 0.7))
-    amplitude = (sizes * kind.h * _ROUND)[:, None] * _directions(rng, WAVES, kind.m)
-    if rng.random() < 0.3:
-        amplitude *= rng.random()
-    size = np.linalg.norm(amplitude, axis=1)
-    frequency = _budgeted(10.0 ** rng.uniform(-1.5, 1.0, WAVES), size, kind.h_t * _share(rng))
-    steepness = _budgeted(10.0 ** rng.uniform(-1.5, 1.0, WAVES), size, kind.h_x * _share(rng))
-    wave = steepness[:, None] * _directions(rng, WAVES, kind.n)
-    member = Member(
-        amplitude=amplitude, frequency=frequency, wave=wave, phase=rng.uniform(0, 2 * np.pi, WAVES)
+def random_members(kind: Class, genes: Array, offset: Array) -> Waves:
+    """Random members for starts that are `offset` (N, n) from the centre; often at the limits of the class."""
+    own, each = genes[:, :6], genes[:, 6:].reshape(len(genes), WAVES, -1)
+    raw = (-np.log1p(-each[..., 0])) ** _UNEVEN
+    part = np.where(own[:, 0] < _FAINT, own[:, 1], 1.0)[:, None]
+    size = kind.h * _ROUND * part * raw / np.maximum(raw.sum(axis=1, keepdims=True), _TINY)
+    rates, steepness = (
+        _budgeted(10 ** (2.5 * each[..., 1 + i] - 1.5), size, bound * _share(own[:, 2 + 2 * i : 4 + 2 * i]))
+        for i, bound in enumerate((kind.h_t, kind.h_x))
     )
-    return beset(started(member, kind, x0 - centre), kind, rng.random(genes_beside(kind)))
+    amplitude, wave = size[..., None] * _unit(each[..., 4 : 4 + kind.m]), _unit(each[..., 4 + kind.m :])
+    wave *= steepness[..., None]
+    base = np.einsum("nwi,ni->nw", wave, offset)
+    angle = np.remainder(base + 2 * np.pi * each[..., 3] + np.pi, 2 * np.pi) - np.pi
+    push = np.zeros(len(genes))
+    return Waves(amplitude, rates, wave, _begun(kind, amplitude, angle, push) - base, push)
 
 
-def _directions(rng: np.random.Generator, count: int, size: int) -> Array:
-    vectors = rng.normal(size=(count, size))
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
-
-
-def _share(rng: np.random.Generator) -> float:
+def _share(genes: Array) -> Array:
     """How much of a bound is used: all of it, half of the time."""
-    return _ROUND if rng.random() < 0.5 else float(rng.random())
+    return np.asarray(np.where(genes[:, 0] < 0.5, _ROUND, genes[:, 1]))
 
 
-def _budgeted(raw: Array, size: Array, budget: float) -> Array:
-    """The rates, scaled so that sum size * rate is the budget."""
-    used = float(size @ raw)
-    return raw * (budget / used) if used > 0 else np.zeros_like(raw)
-
-
-def started(member: Member, kind: Class, offset: Array) -> Member:
-    """The member with its phases moved towards zeros of the waves, as far as |h(0, x(0))| <= H0 asks for."""
-    base = member.wave @ offset
-    angle = np.remainder(base + member.phase + np.pi, 2 * np.pi) - np.pi
-
-    def size(share: float) -> float:
-        return float(np.linalg.norm(np.sin(share * angle) @ member.amplitude))
-
-    room = max(0.0, kind.h_initial - abs(member.push))
-    if size(1.0) <= room:
-        return member
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if size(middle) <= room else (low, middle)
-    return Member(
-        amplitude=member.amplitude,
-        frequency=member.frequency,
-        wave=member.wave,
-        phase=low * angle - base,
-        push=member.push,
-    )
+def _budgeted(raw: Array, size: Array, budget: Array) -> Array:
+    """The rates (N, W), scaled so that sum size * rate is the budget (N,)."""
+    used = np.sum(size * raw, axis=1)
+    return np.asarray(raw * np.where(used > 0, budget / np.maximum(used, _TINY), 0.0)[:, None])
 
 
 def triangle(waves: int) -> tuple[Array, Array]:
@@ -150,128 +136,94 @@ def triangle(waves: int) -> tuple[Array, Array]:
     return j, np.asarray(4 / np.pi * weight * (-1.0) ** np.arange(waves) / j**2)
 
 
-def adversary(kind: Class, genes: Array, x0: Array, centre: Array, layer: float) -> Member:
-    """The member that `genes` in [0, 1] describe: frequency, phase, shares of h_x and push, directions.
+def adversaries(kind: Class, genes: Array, offset: Array, layer: float) -> Waves:
+    """Those of genes for frequency, phase, shares of h_x and push, directions; starts as for random members.
 
     Whatever the frequency, the wave moves as fast, or as far, as the class allows.
     """
-    j, c = triangle(WAVES)
-    frequency = 10.0 ** (3 * genes[0] - 1.5) * (kind.h_t / kind.h if kind.h > 0 else 1.0)
-    pushed = _pushed(kind, genes[3], layer)
-    room_h, room_x, room_t = (
-        bound * _ROUND - used for bound, used in zip((kind.h, kind.h_x, kind.h_t), pushed[1:], strict=True)
-    )
-    slope = room_h / float(np.abs(c).sum())
-    if frequency > 0:
-        slope = min(slope, room_t / frequency)
-    slope = max(slope, 0.0)
-    steepness = genes[2] * room_x / slope if slope > 0 else 0.0
-    q = steepness * _unit(genes[4 : 4 + kind.n])
-    amplitude = slope * c[:, None] * _unit(genes[4 + kind.n : 4 + kind.n + kind.m])[None, :]
-    member = Member(
-        amplitude=amplitude,
-        frequency=j * frequency,
-        wave=j[:, None] * q[None, :],
-        phase=j * 2 * np.pi * genes[1],
-        push=pushed[0],
-    )
-    return beset(_begun(member, kind, x0 - centre), kind, genes[4 + kind.n + kind.m :])
+    (j, c), last = triangle(WAVES), 4 + kind.n
+    frequency = 10.0 ** (3 * genes[:, 0] - 1.5) * (kind.h_t / kind.h if kind.h > 0 else 1.0)
+    push, slope, rate = _pushed(kind, genes[:, 3], layer)
+    room = [bound * _ROUND - used for bound, used in ((kind.h, push), (kind.h_x, slope), (kind.h_t, rate))]
+    height = np.maximum(0.0, np.minimum(room[0] / np.abs(c).sum(), _over(room[2], frequency)))
+    steepness = np.where(height > 0, genes[:, 2] * _over(room[1], height), 0.0)
+    q = steepness[:, None] * _unit(genes[:, 4:last])
+    wave = j[:, None] * q[:, None, :]
+    amplitude = (height[:, None] * c)[..., None] * _unit(genes[:, last : last + kind.m])[:, None, :]
+    base = np.einsum("ni,ni->n", q, offset)
+    angle = np.remainder(base + 2 * np.pi * genes[:, 1] + np.pi, 2 * np.pi) - np.pi
+    begun = _begun(kind, amplitude, angle[:, None] * j, push)
+    return Waves(amplitude, frequency[:, None] * j, wave, begun - base[:, None] * j, push)
 
 
-def genes_of(kind: Class) -> int:
-    """How many numbers describe an adversary."""
-    return 4 + kind.n + kind.m + genes_beside(kind)
-
-
-def genes_beside(kind: Class) -> int:
-    """How many of them are about wind and unknown parameters."""
-    return 0 if kind.sources is None else 3 + kind.sources.k + len(kind.sources.ranges)
-
-
-def beset(member: Member, kind: Class, genes: Array) -> Member:
-    """The member with the wind and the parameters that `genes` in [0, 1] describe."""
-    return member if kind.sources is None else replace(member, beside=_beside(kind.sources, genes))
-
-
-def usual(kind: Class, sources: Sources) -> Beside:
-    """A wind that blows outward and does not turn, beside an h that is given."""
-    genes = np.full(genes_beside(kind), 0.5)
-    genes[1] = 0.0
-    return _beside(sources, genes)
-
-
-def _beside(sources: Sources, genes: Array) -> Beside:
-    """Genes: the aim of the wind, how fast it turns, its phase, its direction, the parameters."""
-    last = 3 + sources.k
-    blows = _unit(genes[3:last]) if sources.k else np.zeros(0)
-    low, high = sources.ranges[:, 0], sources.ranges[:, 1]
-    turns = sources.pace * 10 ** (4 * genes[1] - 1) if genes[1] > _STEADY else 0.0
-    lane = Beside(
-        wind=np.array(sources.wind * _ROUND),
-        aim=np.array(int(2.999 * genes[0])),
-        blowing=blows,
-        gusting=np.array([turns, 2 * np.pi * genes[2] if turns else np.pi / 2]),
-        theta=low + (high - low) * np.clip(_ENDS * (genes[last:] - 0.5) + 0.5, 0.0, 1.0),
-    )
-    return Beside(*(part[None] for part in lane))
-
-
-def _pushed(kind: Class, share: float, layer: float) -> tuple[float, float, float, float]:
-    """The push, and what it uses of |h|, |h_x| and |h_t|: its direction turns at most by 1/layer of what it follows."""
-    if kind.push is None or kind.h == 0:
-        return 0.0, 0.0, 0.0, 0.0
-    slope, rate = (value / layer for value in kind.push)
-    most = min(kind.h, kind.h_x / slope if slope > 0 else kind.h, kind.h_t / rate if rate > 0 else kind.h)
+def _pushed(kind: Class, share: Array, layer: float) -> tuple[Array, Array, Array]:
+    """The push, and what it uses of |h_x| and |h_t|: its direction turns at most by 1/layer of what it follows."""
+    slope, rate = (value / layer for value in kind.push or (0.0, 0.0))
+    most = 0.0
+    if kind.push is not None:
+        most = min(kind.h, *(b / a for a, b in ((slope, kind.h_x), (rate, kind.h_t)) if a > 0))
     push = share * most * _ROUND
-    return push, push, push * slope, push * rate
+    return push, push * slope, push * rate
+
+
+def _over(a: Array, b: Array) -> Array:
+    """a / b, infinite where b is 0."""
+    return np.asarray(np.divide(a, b, out=np.full(a.shape, np.inf), where=b > 0))
 
 
 def _unit(genes: Array) -> Array:
-    vector = 2 * genes - 1
-    length = float(np.linalg.norm(vector))
-    return vector / length if length > 0 else np.eye(len(genes))[0]
+    """Directions (..., n)."""
+    vector = 2 * genes - _NOWHERE
+    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), _TINY))
 
 
-def _begun(member: Member, kind: Class, offset: Array) -> Member:
-    """The triangle with its phase moved as |h(0, x(0))| <= H0 asks for, all harmonics together."""
-    room = max(0.0, kind.h_initial - member.push)
-    j = 2.0 * np.arange(len(member.phase)) + 1
-    base = float(member.wave[0] @ offset)
-    angle = float(np.remainder(base + member.phase[0] + np.pi / 2, np.pi) - np.pi / 2)
-    flipped = np.cos(base + member.phase[0]) < 0
+def _begun(kind: Class, amplitude: Array, angle: Array, push: Array) -> Array:
+    """The angles (N, W) of the waves at the start, moved towards zeros as |h(0, x(0))| <= H0 asks for, all alike."""
+    room = np.maximum(0.0, kind.h_initial - push)
 
-    def size(share: float) -> float:
-        return float(np.linalg.norm(np.sin(j * share * angle) @ member.amplitude))
+    def fits(share: Array) -> Array:
+        h = np.einsum("nw,nwm->nm", np.sin(share[:, None] * angle), amplitude)
+        return np.asarray(np.linalg.norm(h, axis=1) <= room)
 
-    share = 1.0
-    if size(1.0) > room:
-        low, high = 0.0, 1.0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if size(middle) <= room else (low, middle)
-        share = low
-    phase = np.asarray(j * (share * angle - base + (np.pi if flipped else 0.0)))
-    return Member(
-        amplitude=member.amplitude,
-        frequency=member.frequency,
-        wave=member.wave,
-        phase=phase,
-        push=member.push,
+    low, high = np.zeros(len(angle)), np.ones(len(angle))
+    low = np.where(fits(high), 1.0, low)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        good = fits(middle)
+        low, high = np.where(good, middle, low), np.where(good, high, middle)
+    return np.asarray(low[:, None] * angle)
+
+
+def beside_of(kind: Class, genes: Array) -> Beside:
+    """Genes of N lanes: the aim of the wind, how fast it turns, its phase, its direction, the parameters."""
+    own = kind.sources
+    if own is None:
+        return nothing_beside(len(genes))
+    low, high = own.ranges.T
+    turns = np.where(genes[:, 1] > _STEADY, own.pace * 10 ** (4 * genes[:, 1] - 1), 0.0)
+    return Beside(
+        wind=np.full(len(genes), own.wind * _ROUND),
+        aim=np.floor(2.999 * genes[:, 0]),
+        blowing=_unit(genes[:, 3 : 3 + own.k]),
+        gusting=np.stack([turns, 2 * np.pi * np.where(turns > 0, genes[:, 2], 0.25)], axis=1),
+        theta=low + (high - low) * np.clip(_ENDS * (genes[:, 3 + own.k :] - 0.5) + 0.5, 0.0, 1.0),
     )
 
 
-def assembled(members: Sequence[Member], kind: Class, centre: Array, layer: float) -> Disturbance:
-    """One lane for each member; what it adds up to is clipped beside a wind only: every member is in the class."""
-    rows = [member.beside or nothing_beside(1) for member in members]
+def usual(kind: Class) -> Beside:
+    """A wind that blows outward and does not turn, beside an h that is given."""
+    genes = np.full((1, kind.beside), 0.5)
+    genes[:, 1:2] = 0.0
+    return beside_of(kind, genes)
+
+
+def acting(kind: Class, waves: Waves, genes: Array, centre: Array, layer: float) -> Disturbance:
+    """Members and what acts beside them; what it adds up to is clipped beside a wind only: every h is in the class."""
     return Disturbance(
-        beside=Beside(*map(np.concatenate, zip(*rows, strict=True))),
         base=None,
-        amplitude=np.array([member.amplitude for member in members]),
-        frequency=np.array([member.frequency for member in members]),
-        wave=np.array([member.wave for member in members]),
-        phase=np.array([member.phase for member in members]),
-        push=np.array([member.push for member in members]),
-        radius=np.full(len(members), kind.h if kind.sources else np.inf),
+        **waves._asdict(),
+        radius=np.full(len(genes), kind.h if kind.sources else np.inf),
         centre=centre,
+        beside=beside_of(kind, genes),
         layer=layer,
     )
