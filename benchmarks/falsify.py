@@ -14,9 +14,9 @@ from fractions import Fraction
 from pathlib import Path
 
 from tubecert import pipeline
+from tubecert.letters import DISTANCE
 from tubecert.simulate.campaign import Attack, simulate
-from tubecert.simulate.setting import Loop, Setting, setting_of
-from tubecert.simulate.tuning import Choice, loop_of
+from tubecert.simulate.setting import Choice, Loop, Setting, loop_of, setting_of
 from tubecert.spec import load
 
 CONFIGS = Path(__file__).parent.parent / "configs"
@@ -45,9 +45,10 @@ def _setting(name: str) -> Setting:
 
 
 def _far_below(setting: Setting) -> Loop:
-    proof = setting.result["proof"]["distance"]
-    omega, Gamma = (Fraction(repr(proof[name])) for name in ("bandwidth", "adaptation_rate"))
-    choice = Choice(bandwidth=omega * FAR_BELOW[0], adaptation_rate=Gamma * FAR_BELOW[1])
+    proven = setting.certified.proven(DISTANCE)
+    assert proven is not None
+    omega, Gamma = FAR_BELOW
+    choice = Choice(bandwidth=proven.bandwidth * omega, adaptation_rate=proven.adaptation_rate * Gamma)
     return loop_of(setting, "l1", choice)
 
 
@@ -56,24 +57,22 @@ def _row(setting: Setting, loop: Loop, count: int, seed: int) -> None:
     campaign = simulate(setting, [loop], count=count, seed=seed)
     (attack,) = campaign.attacks
     rate = count / (time.perf_counter() - started)
-    assert attack.comparison is not None
     assert attack.worst_comparison is not None
     shares = [_share(attack.comparison), _share(attack.worst_comparison)]
-    left = len(attack.comparison.outside)
+    left = attack.comparison.left_the_tube
     row = f"{setting.spec.name:12} {_words(loop):44} {count:6} {left:6} {shares[0]:>8} {shares[1]:>9} {rate:7.0f}"
     print(row + _notes(attack), flush=True)
 
 
 def _share(found: object) -> str:
-    use = getattr(found, "uses", {}).get("distance")
+    use = getattr(found, "worst", {}).get("distance")
     return "-" if use is None or use.share is None else f"{use.share:.3f}"
 
 
 def _notes(attack: Attack) -> str:
     """Broken promises and runs without a result, if there are any."""
-    assert attack.comparison is not None
-    broken = [item.name for item in attack.comparison.violations]
-    lost = len(attack.comparison.unreliable)
+    broken = [item.bound_of for item in attack.comparison.violations]
+    lost = attack.comparison.no_result
     return (f"  BROKEN: {', '.join(broken)}" if broken else "") + (f"  no result: {lost}" if lost else "")
 
 

@@ -11,7 +11,7 @@ from shared import once
 
 from tubecert import pipeline
 from tubecert.certificate.result import Result
-from tubecert.simulate.certified import adopted
+from tubecert.simulate.reading import adopted
 from tubecert.simulate.runs import Failure, Peak, Runs, Worst
 from tubecert.simulate.setting import Setting, setting_of
 from tubecert.spec import Spec, load, load_text

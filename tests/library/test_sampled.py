@@ -86,8 +86,8 @@ def test_pages_and_comparisons_take_the_value(cart, tmp_path):
     folder = tmp_path / "cart.simulation"
     folder.mkdir()
     (folder / "summary.json").write_text(json.dumps({"outcome": "not falsified", "certificate": cart.hash}))
-    (folder / "tube_use.svg").write_text("<svg/>")
-    assert "data:image/svg" in tc.report(cart, simulation=folder).html
+    (folder / "tube_use.png").write_text("<svg/>")
+    assert "data:image/png" in tc.report(cart, simulation=folder).html
     both = tc.compare(cart, cart)
     assert both.quantities["half_width_in_the_long_run.p"] == (Fraction("0.034"),) * 2
     assert not both.differences

@@ -5,12 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from proven import barely as in_brief
 from rechecked import certified, examine, failing, respecified, sealed, unconfirmed
 
-from tubecert.pipeline import Options, certify
 from tubecert.pipeline.width import measure_in
-from tubecert.simulate.certified import read_numbers
 from tubecert.spec import canonical, load_text
 
 TEXT = (Path(__file__).parents[1] / "specs/ok/outputs.yaml").read_text("utf-8")
@@ -123,11 +120,3 @@ def test_metrics_may_be_compared_by_outputs():
     assert measure_in(spec, ["tip", "m"]).units == {"tip": 0.3, "m": 1.0}
     wanted = TEXT.replace("metric: {rate: 0.8", "metric: {synthesise: {outputs: [tip, x]}} #")
     assert load_text(wanted).synthesis.outputs == ("tip", "x")
-
-
-@pytest.mark.slow
-def test_simulate_reads_the_half_widths_of_outputs():
-    with in_brief():
-        result = certify(load_text(TEXT), Options())
-    widths = result.tube.half_widths
-    assert read_numbers(result).output_widths == tuple(widths[name] for name in ("m", "tip", "twice"))

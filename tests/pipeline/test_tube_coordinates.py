@@ -12,13 +12,12 @@ from tubecert.claims.tube import TubeInSafeSet
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
 from tubecert.simulate.attack import cases
-from tubecert.simulate.compare import compare
 from tubecert.simulate.engine import integrate
 from tubecert.simulate.fast import generator
 from tubecert.simulate.grid import fast_part
+from tubecert.simulate.judge import compare
 from tubecert.simulate.layout import slices
-from tubecert.simulate.setting import setting_of
-from tubecert.simulate.tuning import Choice, loop_of
+from tubecert.simulate.setting import Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 
@@ -211,8 +210,8 @@ def test_simulations_stay_within_what_is_certified(tube):
         (runs,) = integrate([cases(setting, 0, range(6)).of(loop.problem)], tolerance=setting.tolerance)
         found = compare(setting, runs, loop.promise)
         assert not found.violations
-        assert not found.outside
-        assert found.uses["xtilde"].value > 0
+        assert not found.left_the_tube
+        assert found.worst["xtilde"].value > 0
 
 
 @pytest.mark.slow

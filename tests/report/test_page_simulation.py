@@ -22,8 +22,8 @@ def made(tmp_path):
     (tmp_path / "plant.json").write_text(certificate.dump(sealed), encoding="utf-8")
     folder = tmp_path / "plant.simulation"
     folder.mkdir()
-    (folder / "states.svg").write_text(DRAWING)
-    (folder / "other.svg").write_text(DRAWING)
+    (folder / "states.png").write_text(DRAWING)
+    (folder / "other.png").write_text(DRAWING)
     summary = {
         "format": "tubecert-simulation/1",
         "outcome": "not falsified",
@@ -42,7 +42,7 @@ def test_figures_are_images_in_which_nothing_runs(made):
     page = pages.Page(source)
     assert "Outcome: not falsified. A simulation can falsify a certificate" in page.text
     (image,) = page.values("src")
-    assert image.startswith("data:image/svg+xml;base64,")
+    assert image.startswith("data:image/png;base64,")
     assert "<script" not in source
     assert source == tc.report(made / "plant.json", simulation=made / "plant.simulation").html
 

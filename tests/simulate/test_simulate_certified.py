@@ -14,14 +14,12 @@ from tubecert.claims.family import Reason
 from tubecert.claims.metric import MetricDefinite
 from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
-from tubecert.letters import ADAPTIVE, NAMES, words_of
+from tubecert.letters import ADAPTIVE, name_of, words_of
 from tubecert.library.certification import read as read_file
 from tubecert.model import build
 from tubecert.recheck.run import recheck
-from tubecert.simulate.certified import adopted, certified_plan, require_tube
-from tubecert.simulate.promise import KINDS, PREFERRED, kind_for
-from tubecert.simulate.setting import setting_of
-from tubecert.simulate.tuning import CHOSEN, Choice, loop_of
+from tubecert.simulate.reading import adopted, certified_plan, require_tube
+from tubecert.simulate.setting import CHOSEN, Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 
@@ -124,7 +122,8 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
 
 def test_without_certified_gains_the_options_are_named():
     where = setting("flat")
-    bare = replace(where, certified=replace(where.certified, sections={}))
+    result = replace(where.certified.result, sections={}, decided_by=())
+    bare = replace(where, certified=replace(where.certified, result=result))
     error, finding = refused(loop_of, bare, "l1", Choice())
     assert error.exit_code is ExitCode.INVALID
     assert "--bandwidth and --adaptation-rate" in finding.help
@@ -156,33 +155,18 @@ def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
     assert found.h != setting("three_state").h
 
 
-@pytest.mark.slow
 def test_kinds_are_named_alike_everywhere():
-    assert set(KINDS) == {name.option for name in NAMES} == set(PREFERRED)
     assert {item.value for item in Source} == set(words_of(ADAPTIVE))
-    assert all(kind.name.option == key for key, kind in KINDS.items())
-    _, result = certified("two_state", "0.4")
-    adapting = {kind.name.key for kind in KINDS.values() if kind.name.adapts}
-    assert adapting == set(result.proof.of)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("controller", "wanted", "taken"),
-    [
-        ("l1", "26", "26"),
-        ("l1", "distance", "distance"),
-        ("l1", "none", "distance"),
-        ("reference", "26", "26"),
-    ],
-)
-def test_a_loop_takes_the_gains_of_a_kind_that_is_about_it(controller, wanted, taken):
-    assert kind_for(controller, wanted).name.option == taken
+@pytest.mark.parametrize(("controller", "wanted"), [("l1", "26"), ("l1", "B"), ("reference", "26")])
+def test_a_loop_takes_the_gains_of_the_kind_that_is_asked_for(controller, wanted):
     where = setting("two_state", "0.4")
     loop = loop_of(where, controller, Choice(source=wanted))
-    recipe = where.certified.sections[KINDS[taken].name.key].recipe
-    assert loop.problem.gains.bandwidth == recipe["bandwidth"]
-    assert loop.origin == f"certified by {KINDS[taken].name}"
+    recipe = where.certified.result.proof.of[name_of(wanted).key]
+    assert loop.problem.gains.bandwidth == float(recipe.bandwidth)
+    assert loop.origin == f"certified by {name_of(wanted)}"
     assert (loop.promise is None) == (controller == "reference")
 
 
@@ -232,8 +216,8 @@ def test_half_widths_keep_their_states_through_a_file(tmp_path):
     read = read_file(written(tmp_path, result)).result
     assert list(read.tube.half_widths) == ["p", "v"]
     for found in (result, read):
-        widths = setting_of(spec, found).certified.half_widths
-        assert widths == tuple(result.tube.half_widths[name] for name in ("v", "p"))
+        widths = setting_of(spec, found).half_widths
+        assert widths.tolist() == [result.tube.half_widths[name] for name in ("v", "p")]
         assert widths[0] > 1.02 * widths[1]
 
 

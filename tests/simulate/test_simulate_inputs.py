@@ -12,10 +12,9 @@ from simulated import FLAT
 
 from tubecert.letters import name_of
 from tubecert.simulate.campaign import simulate
-from tubecert.simulate.compare import compare
-from tubecert.simulate.setting import setting_of
-from tubecert.simulate.summary import summary
-from tubecert.simulate.tuning import Choice, loop_of
+from tubecert.simulate.judge import compare
+from tubecert.simulate.record import summary
+from tubecert.simulate.setting import Choice, loop_of, setting_of
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 
@@ -66,11 +65,11 @@ def test_a_bound_that_is_too_small_is_broken_by_a_run(limited, end):
     fair = compare(setting, runs, loop.promise)
     assert not fair.violations
     (use,) = fair.inputs
-    (proven,) = loop.promise.ranges
     met = getattr(use, end)
-    forged = replace(loop.promise, ranges=(replace(proven, **{end: 0.9 * met}),))
+    proven = replace(loop.promise.ranges["u"], **{end: 0.9 * met})
+    forged = replace(loop.promise, ranges={"u": proven})
     (broken,) = compare(setting, runs, forged).violations
-    assert broken.name == ("input u" if end == "greatest" else "input -u")
+    assert broken.bound_of == ("input u" if end == "greatest" else "input -u")
     assert broken.value == pytest.approx(abs(met))
     assert broken.bound == pytest.approx(0.9 * abs(met))
 

@@ -19,13 +19,11 @@ from tubecert.pipeline.membership import membership
 from tubecert.records import to_json
 from tubecert.simulate import members
 from tubecert.simulate.campaign import follow
-from tubecert.simulate.certified import adopted
-from tubecert.simulate.compare import Comparison, Use, merged
 from tubecert.simulate.members import drawing_of, member, members_of
+from tubecert.simulate.reading import adopted
+from tubecert.simulate.record import members_data
 from tubecert.simulate.replanning import joined
-from tubecert.simulate.setting import setting_of
-from tubecert.simulate.summary import members_data
-from tubecert.simulate.tuning import Choice, loop_of
+from tubecert.simulate.setting import Choice, loop_of, setting_of
 from tubecert.spec import load_text
 from tubecert.spec.types import Table
 
@@ -107,10 +105,10 @@ def test_the_certified_loop_keeps_to_every_plan_and_to_those_given_up_for_others
     setting, found = followed(4, 2, replan=replan)
     assert (found.plans, found.each) == (3, 2)
     (loop,) = found.followed
-    assert loop.comparison.count == 6
-    assert not loop.comparison.outside
+    assert loop.comparison.runs == 6
+    assert not loop.comparison.left_the_tube
     assert not loop.comparison.violations
-    assert loop.comparison.uses["distance"].bound <= setting.reach
+    assert loop.comparison.worst["distance"].bound <= setting.reach
     assert (0.005 if replan is None else 0) < found.defect <= 0.01
     data = json.loads(json.dumps(to_json(members_data(found))))
     assert data["loops"][0]["runs"] == 6
@@ -122,22 +120,8 @@ def test_gains_that_are_too_small_leave_some_tube():
     """What is reported of further plans is measured: a filter that is far too slow leaves the tube along them."""
     slow = Choice(bandwidth=Fraction(1, 20), adaptation_rate=Fraction(100))
     _, found = followed(3, 6, slow, seconds=3)
-    assert found.followed[0].comparison.outside
+    assert found.followed[0].comparison.left_the_tube
     assert found.followed[0].comparison.first_exit is not None
-
-
-def test_runs_along_several_plans_are_numbered_through():
-    use = Use(value=0.5, bound=1.0, lane=0, time=0.1)
-    none = dict.fromkeys(("violations", "outside", "unreliable"), ())
-    own = Comparison(count=2, uses={"distance": use}, error=0.0, settled=0.0, **none)
-    more = replace(own, uses={"distance": replace(use, value=0.7, lane=1)}, outside=(0,), first_exit=(0, 1.5))
-    found = merged([own, more, replace(more, first_exit=(1, 0.5), outside=(1,), settled=0.2)])
-    assert found.count == 6
-    assert found.outside == (2, 5)
-    assert found.first_exit == (5, 0.5)
-    assert found.uses["distance"] == Use(value=0.7, bound=1.0, lane=3, time=0.1)
-    assert found.settled == 0.2
-    assert merged([own, replace(own, settled=None)]).settled is None
 
 
 @pytest.mark.slow
@@ -181,7 +165,7 @@ def test_a_plan_that_starts_elsewhere_is_not_covered():
         yield joined([drawn[0][0], drawn[-1][1], drawn[0][2], drawn[-1][3]]), 0.0
 
     _, found = followed(2, 3, replan=Fraction(1, 4), plans=jumping)
-    assert found.followed[0].comparison.outside
+    assert found.followed[0].comparison.left_the_tube
 
 
 @pytest.mark.parametrize("option", ["--members", "--plan", "--replan"])

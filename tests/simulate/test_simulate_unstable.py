@@ -11,11 +11,11 @@ from systems import matrix_of, plain_model
 from tubecert.expression import exp, symbol
 from tubecert.report.simulation import report, verdict_line
 from tubecert.simulate.campaign import simulate
-from tubecert.simulate.compare import compare
 from tubecert.simulate.integrator import integrate
+from tubecert.simulate.judge import compare
 from tubecert.simulate.problem import Disturbance, LoopProblem
-from tubecert.simulate.summary import summary
-from tubecert.simulate.tuning import Choice, loop_of
+from tubecert.simulate.record import summary
+from tubecert.simulate.setting import Choice, loop_of
 from tubecert.trajectory import constant_plan
 
 T = symbol("t")
@@ -82,13 +82,13 @@ def test_when_the_tube_is_left_is_told():
     steep = thinner(where, 50)
     drawn = loop_of(steep, "l1", Choice(bandwidth=Fraction(1, 10), adaptation_rate=Fraction(1)))
     found = simulate(steep, [drawn], count=0, seed=0)
-    lane, time = found.drawn[0].comparison.first_exit
+    exit = found.drawn[0].comparison.first_exit
     runs = found.drawn[0].runs
     outside = (runs.distance[0] > steep.reach) | (np.linalg.norm(runs.x[0], axis=1) > steep.rho)
-    assert (lane, time) == (0, runs.t[np.argmax(outside)])
+    assert (exit.run, exit.t) == (0, runs.t[np.argmax(outside)])
     data, words = words_of(found)
     assert data["outcome"] == "tube left"
-    assert data["loops"][0]["first_exit"] == {"run": 0, "t": time}
+    assert data["loops"][0]["first_exit"] == {"run": 0, "t": exit.t}
     assert "first at t = " in words
 
 

@@ -36,7 +36,7 @@ def test_a_campaign_in_twelve_lines_and_a_folder(files):
     assert data["controller"] == ("c" if shutil.which("cc") else "floats")
     assert 0.95 < data["states"]["x"]["adversary"]["share"] <= 1
     names = {path.name for path in (files / "scalar.simulation").iterdir()}
-    assert names == {"summary.json", "runs.npz", "tube_use.png", "tube_use.svg"}  # one state has no plane
+    assert names == {"summary.json", "runs.npz", "tube_use.png"}  # one state has no plane
 
 
 def test_the_same_from_code_of_a_family(files):

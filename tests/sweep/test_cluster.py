@@ -24,7 +24,7 @@ from tubecert.expression import parse, symbol
 from tubecert.libraries import versions
 from tubecert.simulate import campaign
 from tubecert.simulate.attack import cases
-from tubecert.simulate.tuning import Choice, loop_of
+from tubecert.simulate.setting import Choice, loop_of
 from tubecert.trajectory import constant_plan
 from tubecert.tube import Tube
 

@@ -7,17 +7,19 @@ Trusted: no.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from tubecert.campaigns.obstacles import corners_of
+from tubecert.enclosure.interval import Array
 from tubecert.spec import Spec
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FORMATS: Final = ("png", "svg")
+C = TypeVar("C")
 COLORS: Final = {
     "l1": "#0072B2",
     "ccm": "#D55E00",
@@ -27,7 +29,6 @@ COLORS: Final = {
 TUBE: Final = "#E69F00"
 LIGHT: Final = "#FBE3B5"  # of a tube, opaque: overlapping shapes must not darken each other
 STYLE: Final[Any] = {
-    "svg.hashsalt": "tubecert",
     "font.family": "DejaVu Sans",
     "font.size": 9,
     "axes.grid": True,
@@ -67,7 +68,25 @@ def names_of(spec: Spec) -> tuple[str, str] | None:
     return (spec.states[0], spec.states[1]) if len(spec.states) > 1 else None
 
 
-def obstacles(axis: Axes, spec: Spec, names: tuple[str, str]) -> None:
+def plane(
+    spec: Spec, names: tuple[str, str], shapes: Sequence[Array], plan: Array | None
+) -> tuple[Figure, Axes]:
+    """A plane of two states with cross-sections (K, 2) of the tube, the plan (K, 2), if there is one, and obstacles."""
+    from matplotlib.collections import PolyCollection
+
+    figure = blank(6.4, 5.6)
+    axis = figure.subplots()
+    if plan is not None:
+        tube = PolyCollection(shapes, facecolors=LIGHT, edgecolors="none", zorder=1, label="tube")
+        axis.add_collection(tube)
+        axis.plot(*plan.T, color="black", lw=1.0, ls="--", zorder=5, label="plan")
+    _obstacles(axis, spec, names)
+    axis.set_xlabel(labelled(spec, names[0]))
+    axis.set_ylabel(labelled(spec, names[1]))
+    return figure, axis
+
+
+def _obstacles(axis: Axes, spec: Spec, names: tuple[str, str]) -> None:
     """The obstacles in a plane."""
     from matplotlib.patches import Circle, Patch, Polygon
 
@@ -95,13 +114,22 @@ def titled(figure: Figure, axis: Axes, words: str, columns: int) -> None:
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
-def images(name: str, figure: Figure) -> Iterator[tuple[str, bytes]]:
-    """The files of a figure."""
+def drawn(drawers: Mapping[str, Callable[[C], Figure | None]], name: str, campaign: C) -> Figure | None:
+    """A figure by its name; None if there is nothing to draw. Raises `KeyError` for a name that is none."""
     import matplotlib as mpl
 
-    for kind in FORMATS:
-        buffer = io.BytesIO()
-        metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
-        with mpl.rc_context(STYLE):
-            figure.savefig(buffer, format=kind, metadata=metadata)
-        yield f"{name}.{kind}", buffer.getvalue()
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    with mpl.rc_context(STYLE):
+        return drawers[name](campaign)
+
+
+def images(drawers: Mapping[str, Callable[[C], Figure | None]], campaign: C) -> Iterator[tuple[str, bytes]]:
+    """File names and contents, one figure after the other; the same bytes for the same data."""
+    import matplotlib as mpl
+
+    for name in drawers:
+        if (figure := drawn(drawers, name, campaign)) is not None:
+            buffer = io.BytesIO()
+            with mpl.rc_context(STYLE):
+                figure.savefig(buffer, format="png", metadata={"Software": None})
+            yield f"{name}.png", buffer.getvalue()

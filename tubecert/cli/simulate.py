@@ -36,7 +36,7 @@ from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
-    from tubecert.simulate.told import Summary
+    from tubecert.simulate.record import Summary
     from tubecert.spec import Spec
 
 _CODES: Final = {
@@ -83,9 +83,8 @@ def run(given: Given, output: Output) -> ExitCode:
     folder = _folder(given)
     executor = Serial() if given.scheduler is None else cluster_at(given.scheduler)
     from tubecert.campaigns.folder import prepared
-    from tubecert.simulate.output import write
-    from tubecert.simulate.summary import summary
-    from tubecert.simulate.told import outcome
+    from tubecert.simulate.files import write
+    from tubecert.simulate.record import summary
 
     require_members(system, wishes, flag)
     terminal = Terminal.stderr(color=output.color)
@@ -95,8 +94,9 @@ def run(given: Given, output: Output) -> ExitCode:
         if report is not None:
             report(Step(phase=Phase.FIGURES))
         files = write(folder, campaign, certificate=certified.hash)
-    _report(summary(campaign, certified.hash), folder, len(files), output, drawn=not campaign.interrupted)
-    return _CODES.get(outcome(campaign), ExitCode.CERTIFIED)
+    data = summary(campaign, certified.hash)
+    _report(data, folder, len(files), output, drawn=not campaign.interrupted)
+    return _CODES.get(data.outcome, ExitCode.CERTIFIED)
 
 
 def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Output) -> ExitCode:
@@ -152,7 +152,7 @@ def _certificate(
 ) -> tuple[Spec, Certificate]:
     """The specification as it was certified, and its certificate: the one that is given, or a new one."""
     from tubecert.library.certification import certification_of, read
-    from tubecert.simulate.certified import adopted, require_tube
+    from tubecert.simulate.reading import adopted, require_tube
 
     if given.certificate is not None:
         certified = read(str(given.certificate)).certificate

@@ -109,7 +109,7 @@ def simulated_in(folder: str, certificate: AnyCertificate) -> Simulated:
         raise _refused("TC601", f"{folder} holds no simulation of tubecert") from None
     if summary.certificate != certificate.hash:
         raise _refused("TC604", f"the simulation in {folder} was compared with another certificate")
-    names = ((name, os.path.join(folder, f"{name}.svg")) for name in TITLES)
+    names = ((name, os.path.join(folder, f"{name}.png")) for name in TITLES)
     figures = {name: files.read(path, _FOLDER) for name, path in names if os.path.exists(path)}
     return Simulated(outcome=summary.outcome, figures=figures)
 

@@ -55,9 +55,10 @@ class SampledSimulation:
 
         Raises `KeyError` for a name that is none, or of which there is nothing to draw.
         """
-        from tubecert.simulation.figures import drawn
+        from tubecert.campaigns.figures import drawn
+        from tubecert.simulation.figures import DRAWERS
 
-        found = drawn(name, self.campaign)
+        found = drawn(DRAWERS, name, self.campaign)
         if found is None:
             raise KeyError(f"{name}: there is no plane of one state")
         return found

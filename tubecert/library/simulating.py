@@ -89,7 +89,7 @@ def simulate(
     require_extra()
     chosen = controllers_of(controllers, str)
     one_of("gains", gains, words_of(ADAPTIVE))
-    from tubecert.simulate.certified import adopted, require_tube
+    from tubecert.simulate.reading import adopted, require_tube
 
     wishes = wishes_of(system, numbers, chosen, gains, plan)
     require_members(system, wishes, str)
@@ -219,7 +219,7 @@ def controllers_of(given: str | Sequence[str] | None, named: Named) -> tuple[str
 
 def require_members(system: Spec, wishes: Wishes, named: Named) -> None:
     """Raises TC708 where a plan of a family is asked for, and there is no family."""
-    from tubecert.simulate.certified import require_family
+    from tubecert.simulate.reading import require_family
 
     asked = ("members", wishes.members), ("replan", wishes.replan), ("plan", wishes.plan)
     require_family(system, [named(name) for name, value in asked if value is not None])
@@ -233,14 +233,10 @@ def wishes_of(
     plan: File | None = None,
 ) -> Wishes:
     """What is simulated of a specification."""
-    from tubecert.simulate.promise import KINDS
-
     default = system.simulation or Section()
-    option = name_of(gains or default.gains or DISTANCE.option).option
-    adaptive = KINDS[option].controller
     return Wishes(
-        controllers=chosen or default.controllers or ("ccm", adaptive),
-        gains=option,
+        controllers=chosen or default.controllers or ("ccm", "l1"),
+        gains=name_of(gains or default.gains or DISTANCE.option).option,
         runs=_first(numbers.runs, default.runs, RUNS),
         seed=_first(numbers.seed, default.seed, SEED),
         replay=numbers.replay,
@@ -269,7 +265,7 @@ def campaign_of(
     from tubecert.simulate.campaign import simulate as campaign
     from tubecert.simulate.compiled import told
     from tubecert.simulate.members import members_of
-    from tubecert.simulate.tuning import Choice, loop_of
+    from tubecert.simulate.setting import Choice, loop_of
 
     setting, drawing = _setting(system, result, wishes)
     choice = Choice(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tubecert.digits import near
+from tubecert.digits import short
 from tubecert.enclosure.interval import Array
 from tubecert.library.specification import File
 from tubecert.records import Json
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tubecert.simulate.campaign import Campaign
+    from tubecert.simulate.record import Outcome, Summary
     from tubecert.simulate.runs import Runs
-    from tubecert.simulate.told import Summary
 
 
 OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
@@ -35,9 +35,9 @@ class Simulation:
     compared_with: str
 
     @property
-    def outcome(self) -> str:
+    def outcome(self) -> Outcome:
         """`not falsified`, `falsified`, `tube left`, `no result`, `interrupted` or `nothing claimed`."""
-        from tubecert.simulate.told import outcome
+        from tubecert.simulate.record import outcome
 
         return outcome(self.campaign)
 
@@ -52,7 +52,7 @@ class Simulation:
         return self._found().to_json()
 
     def _found(self) -> Summary:
-        from tubecert.simulate.summary import summary
+        from tubecert.simulate.record import summary
 
         return summary(self.campaign, self.compared_with)
 
@@ -80,20 +80,21 @@ class Simulation:
 
         Raises `KeyError` for a name that is none, or of which there is nothing to draw.
         """
-        from tubecert.simulate.figures import drawn
+        from tubecert.campaigns.figures import drawn
+        from tubecert.simulate.figures import DRAWERS
 
-        found = drawn(name, self.campaign)
+        found = drawn(DRAWERS, name, self.campaign)
         if found is None:
             raise KeyError(f"{name}: nothing was simulated that it shows")
         return found
 
     def save(self, folder: File) -> list[str]:
-        """Write data, tables, figures and the summary into a folder, as the command does; their names.
+        """Write data, figures and the summary into a folder, as the command does; their names.
 
         Raises `TargetError`.
         """
         from tubecert.campaigns.folder import prepared
-        from tubecert.simulate.output import write
+        from tubecert.simulate.files import write
 
         with prepared(os.fspath(folder)):
             return write(os.fspath(folder), self.campaign, certificate=self.compared_with)
@@ -112,6 +113,7 @@ class Simulation:
         style = "falsified" if self.falsified else ""
         reach, attacks = self.campaign.setting.reach, self.campaign.attacks
         rows = [
-            (item.loop.controller, f"largest d/dbar {near(item.greatest / reach, 4)}") for item in attacks
+            (item.loop.controller, f"largest d/dbar {short(item.greatest and item.greatest / reach)}")
+            for item in attacks
         ]
         return notebook.of_line(str(self), self.campaign.setting.spec.name, style, rows)

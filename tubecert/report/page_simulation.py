@@ -26,7 +26,7 @@ _PROVES_NOTHING = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Simulated:
-    """What is shown of a simulation: its outcome, and figures (SVG) by name."""
+    """What is shown of a simulation: its outcome, and figures (PNG) by name."""
 
     outcome: str
     figures: Mapping[str, bytes]
@@ -37,7 +37,7 @@ def simulated_blocks(found: Simulated) -> Iterator[Block]:
     yield Words(text=_PROVES_NOTHING.format(outcome=found.outcome))
     yield Pictures(
         pictures=tuple(
-            Picture(title=TITLES[name], source=f"data:image/svg+xml;base64,{b64encode(data).decode()}")
+            Picture(title=TITLES[name], source=f"data:image/png;base64,{b64encode(data).decode()}")
             for name, data in found.figures.items()
         )
     )

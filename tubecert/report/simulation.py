@@ -15,18 +15,8 @@ from tubecert.report.layout import indented, titled
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tubecert.simulate.inputs import InputUse
-    from tubecert.simulate.told import (
-        ClearanceData,
-        ComparisonData,
-        GainsData,
-        LoopData,
-        MembersData,
-        RunAt,
-        StoppedData,
-        Summary,
-        ViolationData,
-    )
+    from tubecert.simulate.judge import Clearance, Comparison, InputUse, RunAt, Stopped, Violation
+    from tubecert.simulate.record import GainsData, LoopData, MembersData, Summary
 
 STYLES: Final = {
     "falsified": "bold red",
@@ -37,7 +27,7 @@ STYLES: Final = {
     "nothing claimed": "bold",
 }
 CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."
-_DRAWN: Final = " and figures (PNG, SVG)"
+_DRAWN: Final = " and figures"
 _NOT_DRAWN: Final = "; no figures of what was interrupted"
 _WORDS: Final = {
     "deviation": "|x - x*|",
@@ -55,7 +45,7 @@ class _Part:
     """Runs of a loop, and what they are about; `{run}` stands for the number of a run."""
 
     loop: LoopData
-    comparison: ComparisonData
+    comparison: Comparison
     what: str
 
     @property
@@ -63,7 +53,7 @@ class _Part:
         """Whether the loop is meant to stay in the tube, and there are runs that say whether it does."""
         return self.loop.tested and bool(self.comparison.worst)
 
-    def run(self, item: RunAt | StoppedData | ViolationData) -> str:
+    def run(self, item: RunAt | Stopped | Violation) -> str:
         """Which run it was."""
         return self.what.replace("{run}", str(item.run))
 
@@ -85,7 +75,7 @@ def report(
     for title, body in _sections(data, verbose):
         parts += titled(title, body)
     where = Text(f"{files} files ", style="bold", no_wrap=True, overflow="ignore").append(
-        f"in {folder}: summary.json, runs.npz, tables (CSV){_DRAWN if drawn else _NOT_DRAWN}",
+        f"in {folder}: summary.json, runs.npz{_DRAWN if drawn else _NOT_DRAWN}",
         style="not bold",
     )
     return [*parts, Text(), where]
@@ -165,11 +155,11 @@ def _sections(data: Summary, verbose: bool) -> Iterator[tuple[str, list[Renderab
         yield "Gains", [_gains(own.loop, own.loop.gains) for own in data.loops if own.loop.gains is not None]
 
 
-def _when(item: ViolationData) -> str:
+def _when(item: Violation) -> str:
     return "" if item.t is None else f"t = {short(item.t)} s, "
 
 
-def _violation(part: _Part, item: ViolationData) -> Text:
+def _violation(part: _Part, item: Violation) -> Text:
     where, name = part.run(item), _WORDS.get(item.bound_of, item.bound_of)
     what = f"{part.loop.controller}: {name} is {short(item.value, 6)}"
     text = Text(f"{what}, promised at most {short(item.bound, 6)}; {_when(item)}{where}", "red")
@@ -178,7 +168,7 @@ def _violation(part: _Part, item: ViolationData) -> Text:
     return text
 
 
-def _stopped(part: _Part, item: StoppedData) -> Text:
+def _stopped(part: _Part, item: Stopped) -> Text:
     return Text(f"{part.loop.controller}: {item.reason} at t = {short(item.t)} s, {part.run(item)}")
 
 
@@ -215,7 +205,7 @@ def _gain_words(loop: LoopData) -> str:
     return ", ".join(words)
 
 
-def _share(own: ComparisonData | None, name: str) -> str:
+def _share(own: Comparison | None, name: str) -> str:
     use = None if own is None else own.worst.get(name)
     if use is None or use.share is None:
         return UNKNOWN
@@ -243,7 +233,7 @@ def _attacks(data: Summary) -> Table:
             attack.loop.controller,
             runs,
             UNKNOWN if found is None else str(found.left_the_tube),
-            UNKNOWN if found is None else str(found.no_result + len(found.stopped)),
+            UNKNOWN if found is None else str(found.no_result),
             _share(found, "distance"),
             _share(None if attack.adversary is None else attack.adversary.comparison, "distance"),
             settled,
@@ -268,7 +258,7 @@ def _members(members: MembersData) -> Iterator[RenderableType]:
             own.loop.controller,
             str(found.runs),
             str(found.left_the_tube),
-            str(found.no_result + len(found.stopped)),
+            str(found.no_result),
             _share(found, "distance"),
             UNKNOWN if found.settled is None else f"{short(found.settled)} s",
         )
@@ -318,7 +308,7 @@ def _obstacles(data: Summary) -> Table:
     return table
 
 
-def _clearance(item: ClearanceData) -> str:
+def _clearance(item: Clearance) -> str:
     value = short(item.clearance)
     return f"collides, {value} at {short(item.t)} s" if item.collides else value
 

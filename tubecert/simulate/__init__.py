@@ -15,12 +15,11 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `stepping` | one lane: RK4 on the slow part, with the flow of the fast part inside |
 | `fast` | (xtilde, sigma_hat, u_a): exact where linear, resolved while projecting |
 | `feedback`, `geodesic` | min-norm feedback, disturbance; Chebyshev geodesics by Newton |
-| `certified`, `promise` | a certificate, read back; what it promises about a loop |
+| `reading` | a certificate, read back; what it promises about a loop |
 | `setting` | plan, times, starts and loops with their gains, certified or chosen |
 | `members` | random plans of a family |
 | `uncertainty` | random members and adversaries of the certified class |
 | `attack`, `campaign` | random runs and the search for the worst; all that one command simulates |
-| `compare`, `clearance` | runs against promises; distances from obstacles |
-| `summary`, `output` | a campaign as data and files |
-| `figures`, `figures_plane`, `figures_style` | figures over time, in a plane of states; their lines and names |
+| `judge` | runs against promises; distances from obstacles |
+| `record`, `files`, `figures` | a campaign as the records of its summary, as files, as figures |
 """

@@ -18,9 +18,8 @@ import numpy as np
 from tubecert.executor import Executor, Serial
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.attack import Cases, cases, worst
-from tubecert.simulate.clearance import Clearance, of_curve, of_tube
-from tubecert.simulate.compare import Comparison, check_class, compare, merged
 from tubecert.simulate.engine import integrate
+from tubecert.simulate.judge import Comparison, check_class, compare, merged
 from tubecert.simulate.problem import Disturbance
 from tubecert.simulate.runs import Runs, joined
 from tubecert.simulate.setting import Loop, Setting
@@ -45,12 +44,11 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawn:
-    """One run of a loop that is drawn: its comparison, and its clearance from every obstacle."""
+    """One run of a loop that is drawn, and its comparison."""
 
     loop: Loop
     runs: Runs
     comparison: Comparison
-    clearance: tuple[Clearance, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,10 +63,10 @@ class Attack:
     worst_comparison: Comparison | None = None
 
     @property
-    def greatest(self) -> float:
-        """The largest d(x*, x) that was met."""
-        found = [c.uses["distance"].value for c in (self.comparison, self.worst_comparison) if c and c.uses]
-        return max(found, default=float("nan"))
+    def greatest(self) -> float | None:
+        """The largest d(x*, x) that was met, if a run is a result."""
+        found = [c.worst["distance"].value for c in (self.comparison, self.worst_comparison) if c and c.worst]
+        return max(found, default=None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -103,8 +101,6 @@ class Campaign:
     uncertainty: str
     drawn: tuple[Drawn, ...]
     attacks: tuple[Attack, ...]
-    plan_clearance: tuple[Clearance, ...]
-    tube_clearance: tuple[Clearance, ...]
     count: int
     seed: int
     interrupted: bool
@@ -131,20 +127,12 @@ class Campaign:
     @property
     def left(self) -> bool:
         """Whether a loop that is meant to stay in the tube left it, promised or not."""
-        return any(loop.tested and found.outside for loop, found in self.comparisons)
+        return any(loop.tested and found.left_the_tube for loop, found in self.comparisons)
 
     @property
     def unreliable(self) -> bool:
         """Whether some run of a loop that is tested is no result: its own error estimate is too large, or it failed."""
-        return any(
-            loop.tested and (found.unreliable or len(found.failures) > _exits(found))
-            for loop, found in self.comparisons
-        )
-
-
-def _exits(found: Comparison) -> int:
-    """How many of the runs that were stopped had left the tube."""
-    return sum(lane in found.outside for lane, _, _ in found.failures)
+        return any(loop.tested and found.no_result for loop, found in self.comparisons)
 
 
 def simulate(
@@ -176,7 +164,7 @@ def simulate(
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
             check_class(setting, item.runs, setting.h, where)
-    lost = [item.loop for item in drawn if item.comparison.unreliable]
+    lost = [item.loop for item in drawn if item.comparison.no_result]
     attacks = []
     for loop, *sample in zip(tested, *parts, strict=True):
         attack = _sampled(setting, loop, joined(sample), count, seed)
@@ -184,16 +172,11 @@ def simulate(
             attack = _attacked(setting, attack, seed, report)
             complete = attack.worst is not None
         attacks.append(attack)
-    first = drawn[0].runs
     return Campaign(
         setting=setting,
         uncertainty=SPECIFIED if replay is None else RANDOM.format(run=replay, seed=seed),
         drawn=tuple(drawn),
         attacks=tuple(attacks),
-        plan_clearance=of_curve(setting.spec, first.t, first.x_plan),
-        tube_clearance=of_tube(
-            setting.spec, first.t, first.x_plan, setting.greatest_radius, setting.half_widths
-        ),
         count=count,
         seed=seed,
         interrupted=not complete,
@@ -248,12 +231,7 @@ def _found(
 
 
 def _drawn(setting: Setting, loop: Loop, runs: Runs) -> Drawn:
-    return Drawn(
-        loop=loop,
-        runs=runs,
-        comparison=compare(setting, runs, loop.promise),
-        clearance=of_curve(setting.spec, runs.t, runs.x[0]),
-    )
+    return Drawn(loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise))
 
 
 def _sampled(setting: Setting, loop: Loop, runs: Runs, count: int, seed: int) -> Attack:
@@ -323,5 +301,9 @@ def _along(
     pairs = [(own, loop, case) for own, case in zip(around, drawn, strict=True) for loop in loops]
     batches = [case.of(loop.along(own.plan).problem) for own, loop, case in pairs]
     runs = integrate(batches, tolerance=setting.tolerance)
-    seen = [compare(own, found, loop.promise) for (own, loop, _), found in zip(pairs, runs, strict=True)]
+    starts = [(first - 1 + place // len(loops)) * each for place in range(len(pairs))]
+    seen = [
+        compare(own, found, loop.promise, start)
+        for (own, loop, _), found, start in zip(pairs, runs, starts, strict=True)
+    ]
     return [*zip(*[iter(seen)] * len(loops), strict=True)]

@@ -1,7 +1,8 @@
-"""What is simulated: plan, times, starts, what a certificate proves; and a loop with what is promised about it."""
+"""What is simulated: plan, times, starts, what a certificate proves; loops, their gains, and what they promise."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
@@ -18,51 +19,30 @@ from tubecert.errors import TubecertError
 from tubecert.expression import Expression
 from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.findings import Finding
+from tubecert.kinds import DISTANCE, name_of
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulate.certified import Certified, certified_plan, read_numbers
-from tubecert.simulate.loops import Controller
-from tubecert.simulate.problem import LoopProblem
-from tubecert.simulate.promise import Promise
+from tubecert.simulate.loops import DESIGNS, Controller
+from tubecert.simulate.problem import LoopGains, LoopProblem
+from tubecert.simulate.reading import Certified, Promise, certified_plan, promise
 from tubecert.simulate.uncertainty import Class, Sources, class_of
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
 
 TIMES: Final = 501  # output times of the loops that are drawn
+CHOSEN: Final = "chosen, not certified"
 _LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
-_TOLERANCE_IF_DEAR: Final = 5e-3  # half of what would be no result
 _TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Loop:
-    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one."""
-
-    problem: LoopProblem
-    origin: str
-    promise: Promise | None
-
-    def along(self, plan: Plan) -> Loop:
-        """The same around another plan."""
-        return replace(self, problem=replace(self.problem, plan=plan))
-
-    @property
-    def controller(self) -> Controller:
-        """Its controller."""
-        return self.problem.controller
-
-    @property
-    def tested(self) -> bool:
-        """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
-        return self.problem.terms.predicts
+_LIMIT: Final = 100  # of the greatest radius: what is further away from the plan is not followed any more
+_DEGREE: Final = 5  # of the polynomials that geodesics are
+_EVEN, _EVEN_DEGREE = 1.01, 3  # where M varies by a factor of less over the tube, cubic ones are as near
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
     """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0.
 
-    `spread` (n,): how far from x0 they may be, state by state. `E` (n, k) is that of the wind. `uncertainty` is the
-    class of what may act. `dear`: every run takes so many steps that they are attacked with runs that are less
-    accurate, and with fewer.
+    `spread` (n,): how far from x0 they may be, state by state. `E` (n, k) is that of the wind, `rest` (n, 1) what
+    unknown parameters do that no input can. `uncertainty` is the class of what may act.
     """
 
     spec: Spec
@@ -80,7 +60,6 @@ class Setting:
     rest: Matrix
     h: tuple[Expression, ...] | None
     layer: float
-    dear: bool = False
 
     @property
     def varied(self) -> bool:
@@ -122,25 +101,26 @@ class Setting:
     @property
     def tolerance(self) -> float:
         """The error of |S x| that the integrator is asked for."""
-        return (_TOLERANCE_IF_DEAR if self.dear else _TOLERANCE) * self.rho
+        return _TOLERANCE * self.rho
 
     @property
     def half_widths(self) -> Array:
         """Bounds of |x_i - x_i*| in the tube, (n,)."""
-        return np.array(self.certified.half_widths)
+        return np.array([self.certified.half_widths[name] for name in self.spec.states])
 
 
 def setting_of(
     spec: Spec, result: Result, duration: Fraction | None = None, plan: Plan | None = None
 ) -> Setting:
-    """The setting of a specification and its certification, which has a tube; `plan` is one of a family."""
-    model = build(spec)
+    """The setting of a specification and its certification, which has a tube; `plan` is one of a family.
+
+    Raises `TubecertError` where the certificate lacks what is needed, or the plan is too short.
+    """
+    model, certified = build(spec), Certified.of(result)
     single = certified_plan(spec, model, result) if plan is None else plan
     horizon = horizon_of(spec, duration)
-    certified = read_numbers(result)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
-    centre = _start_of(single)
-    n, m = len(spec.states), len(spec.inputs)
+    centre, fields = _start_of(single), Fields(model, _coordinates(result))
     return Setting(
         spec=spec,
         certified=certified,
@@ -152,59 +132,12 @@ def setting_of(
         centre=centre,
         within=0.0 if spec.within is None else float(spec.within),
         spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
-        uncertainty=class_of(certified, n, m, _beside(certified, model)),
-        E=_wind(model, result),
-        rest=_rest(model, result),
+        uncertainty=class_of(certified, len(spec.states), len(spec.inputs), _sources(certified, model)),
+        E=_wind(model, fields),
+        rest=_rest(model, fields),
         h=None if wanted is None else tuple(term.expression for term in wanted),
         layer=_LAYER * certified["metric_input_gain"] * certified.reach,
     )
-
-
-def _beside(certified: Certified, model: ControlAffineModel) -> Sources | None:
-    """What acts beside h; None if nothing does."""
-    if not model.E and not model.parameters:
-        return None
-    return Sources(
-        pace=certified.rate,
-        k=len(model.E[0]) if model.E else 0,
-        wind=float(model.wind_bound or 0),
-        ranges=_ranges(model),
-    )
-
-
-def _ranges(model: ControlAffineModel) -> Array:
-    """Those of the parameters, (p, 2)."""
-    return np.array([[float(low), float(high)] for _, (low, high) in model.parameters]).reshape(-1, 2)
-
-
-def _rest(model: ControlAffineModel, result: Result) -> Matrix:
-    """What unknown parameters do that no input can; the rest of it is a part of h, as large as the class allows."""
-    if not model.drift:
-        return ()
-    matched = column(Beside(_fields(model, result)).known)
-    unknown = combine(1, column(model.drift), -1, column(model.f))
-    return combine(1, unknown, -1, multiply(model.B, matched))
-
-
-def _fields(model: ControlAffineModel, result: Result) -> Fields:
-    """The model in the coordinates of the tube."""
-    rows = None if result.tube is None else result.tube.coordinates
-    S = None if rows is None else Coordinates(tuple(tuple(Fraction(q) for q in row) for row in rows))
-    return Fields(model, S)
-
-
-def _wind(model: ControlAffineModel, result: Result) -> Matrix:
-    """E, or where w has a rate (I - B B^+) E: the rest of it is a part of h, which is as large as the class allows."""
-    if model.wind_rate is None:
-        return model.E
-    fields = _fields(model, result)
-    reached = multiply(fields.B_pinv, fields.of_vector(model.E))
-    return combine(1, model.E, -1, multiply(model.B, reached))
-
-
-def _start_of(plan: Plan) -> Array:
-    """x*(0), (n,)."""
-    return Tape(plan.start, ()).run_floats([], ())
 
 
 def horizon_of(spec: Spec, duration: Fraction | None) -> float:
@@ -217,3 +150,160 @@ def horizon_of(spec: Spec, duration: Fraction | None) -> float:
         message = f"the plan ends at {near(spec.trajectory.horizon)} s, before {near(wanted)} s"
         raise TubecertError([Finding(code="TC704", message=message, help="ask for a shorter duration")])
     return float(wanted)
+
+
+def _start_of(plan: Plan) -> Array:
+    """x*(0), (n,)."""
+    return Tape(plan.start, ()).run_floats([], ())
+
+
+def _coordinates(result: Result) -> Coordinates | None:
+    rows = None if result.tube is None else result.tube.coordinates
+    return None if rows is None else Coordinates(tuple(tuple(map(Fraction, row)) for row in rows))
+
+
+def _sources(certified: Certified, model: ControlAffineModel) -> Sources | None:
+    """What acts beside h; None if nothing does."""
+    if not model.E and not model.parameters:
+        return None
+    ranges = [[float(low), float(high)] for _, (low, high) in model.parameters]
+    return Sources(
+        pace=certified.rate,
+        k=len(model.E[0]) if model.E else 0,
+        wind=float(model.wind_bound or 0),
+        ranges=np.array(ranges).reshape(-1, 2),
+    )
+
+
+def _rest(model: ControlAffineModel, fields: Fields) -> Matrix:
+    """What unknown parameters do that no input can; the rest of it is a part of h, as large as the class allows."""
+    if not model.drift:
+        return ()
+    unknown = combine(1, column(model.drift), -1, column(model.f))
+    return combine(1, unknown, -1, multiply(model.B, column(Beside(fields).known)))
+
+
+def _wind(model: ControlAffineModel, fields: Fields) -> Matrix:
+    """E, or where w has a rate (I - B B^+) E: the rest of it is a part of h, which is as large as the class allows."""
+    if model.wind_rate is None:
+        return model.E
+    reached = multiply(fields.B_pinv, fields.of_vector(model.E))
+    return combine(1, model.E, -1, multiply(model.B, reached))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What the command line says about gains: the kind of certificate that has them, and what replaces its numbers."""
+
+    source: str = DISTANCE.option
+    bandwidth: Fraction | None = None
+    adaptation_rate: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Loop:
+    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one."""
+
+    problem: LoopProblem
+    origin: str
+    promise: Promise | None
+
+    def along(self, plan: Plan) -> Loop:
+        """The same around another plan."""
+        return replace(self, problem=replace(self.problem, plan=plan))
+
+    @property
+    def controller(self) -> Controller:
+        """Its controller."""
+        return self.problem.controller
+
+    @property
+    def tested(self) -> bool:
+        """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
+        return self.problem.terms.predicts
+
+
+def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
+    """A loop with its gains; raises `TubecertError` if there are none for it."""
+    if setting.model.gained:
+        raise TubecertError([_known_gains_only(setting)])
+    terms, kind, gains, origin, covered = (
+        DESIGNS[controller].terms,
+        name_of(choice.source),
+        None,
+        "no adaptation",
+        False,
+    )
+    if terms.filters:
+        gains, covered = _gains(setting, controller, choice)
+        origin = f"certified by {kind}" if covered else CHOSEN
+    problem = LoopProblem(
+        model=setting.model,
+        plan=setting.plan,
+        controller=controller,
+        horizon=setting.horizon,
+        times=setting.times,
+        gains=gains,
+        limit=_LIMIT * setting.greatest_radius,
+        degree=_EVEN_DEGREE if _even(setting.certified) else _DEGREE,
+        P=setting.S.T @ setting.S,
+        E=setting.E,
+        rest=setting.rest,
+    )
+    promised = promise(setting.certified, kind) if covered and terms.predicts else None
+    return Loop(problem=problem, origin=origin, promise=promised)
+
+
+def _even(own: Certified) -> bool:
+    """Whether a S'S <= M <= A S'S with nearly the same a and A over the tube: geodesics hardly bend there."""
+    return own.upper is not None and own.upper <= _EVEN * (own.reach / own.rho) ** 2
+
+
+def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[LoopGains, bool]:
+    """The gains of a loop that filters, and whether they are those that a certificate proves."""
+    adapts = DESIGNS[controller].terms.adapts
+    proven = setting.certified.proven(name_of(choice.source))
+    bandwidth = choice.bandwidth or (None if proven is None else proven.bandwidth)
+    rate = choice.adaptation_rate or (None if proven is None else proven.adaptation_rate)
+    if bandwidth is None or (adapts and rate is None):
+        raise TubecertError([_no_gains(controller, choice, bandwidth is None, adapts and rate is None)])
+    smooth = setting.spec.adaptation.smooth if adapts else None
+    gains = LoopGains(
+        bandwidth=float(bandwidth),
+        adaptation_rate=None if rate is None else float(rate),
+        projection_radius=float(proven.projection_radius) if proven else _radius(setting),
+        predictor_gain=float(proven.predictor_gain if proven else bandwidth),
+        smooth=None if smooth is None else float(smooth),
+    )
+    same = (
+        proven is not None
+        and bandwidth == proven.bandwidth
+        and (not adapts or rate == proven.adaptation_rate)
+    )
+    return gains, same
+
+
+def _radius(setting: Setting) -> float:
+    """R_H where no certificate gives one: Dh, with what the smooth layer needs."""
+    smooth = setting.spec.adaptation.smooth
+    return setting.uncertainty.h * math.sqrt(1 + float(smooth or 0)) * (1 + 1e-6) or 1.0
+
+
+def _no_gains(controller: Controller, choice: Choice, *missing: bool) -> Finding:
+    options = [
+        option for option, own in zip(("--bandwidth", "--adaptation-rate"), missing, strict=True) if own
+    ]
+    return Finding(
+        code="TC705",
+        message=f"{name_of(choice.source)} certifies no gains for the controller {controller}",
+        help=f"choose {' and '.join(options)} (then nothing is covered by the certificate), or another --gains",
+    )
+
+
+def _known_gains_only(setting: Setting) -> Finding:
+    return Finding(
+        code="TC705",
+        message="parameters known by ranges stand in B, and the loops are stated for a known B",
+        location=setting.spec.location("system.B"),
+        help="give each of them one value: --set system.parameters.NAME=VALUE",
+    )

@@ -18,8 +18,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulate.certified import Certified
 from tubecert.simulate.problem import Beside, Disturbance, nothing_beside
+from tubecert.simulate.reading import Certified
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
 _ROUND: Final = 1 - 1e-9  # sums of floats stay within the class

@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tubecert.campaigns.figures import (
-    COLORS,
-    LIGHT,
-    STYLE,
-    TUBE,
-    blank,
-    images,
-    labelled,
-    names_of,
-    obstacles,
-    titled,
-)
+from tubecert.campaigns.figures import COLORS, TUBE, blank, images, labelled, names_of, plane, titled
 from tubecert.campaigns.folder import npz
 from tubecert.enclosure.interval import Array
 from tubecert.simulation.campaign import Campaign
@@ -36,18 +24,7 @@ def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     """Of a campaign of one run at least, beside its summary; the same campaign gives the same bytes."""
     arrays = {name: campaign.all(name) for name in _KEPT} | {"names": np.array(campaign.setting.names)}
     yield "runs.npz", npz({**arrays, "profile": campaign.profile, "aimed": campaign.aimed})
-    for name in ("tube_use", "plane"):
-        if (figure := drawn(name, campaign)) is not None:
-            yield from images(name, figure)
-
-
-def drawn(name: str, campaign: Campaign) -> Figure | None:
-    """A figure by its name; None if there is nothing to draw. Raises `KeyError` for a name that is none."""
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    import matplotlib as mpl
-
-    with mpl.rc_context(STYLE):
-        return {"tube_use": _tube_use, "plane": _plane}[name](campaign)
+    yield from images(DRAWERS, campaign)
 
 
 def _title(campaign: Campaign) -> str:
@@ -78,26 +55,20 @@ def _plane(campaign: Campaign) -> Figure | None:
     own, names = campaign.setting, names_of(campaign.setting.spec)
     if names is None:
         return None
-    from matplotlib.collections import PolyCollection
-
     i, j = (own.spec.states.index(name) for name in names)
-    figure = blank(6.4, 5.6)
-    axis = figure.subplots()
+    plan, boxes = None, list[Array]()
     if own.spec.trajectory.bundle is None:
         plan = campaign.found[0].course.x[:: len(own.lengths), [i, j], 0]
         shown = np.unique(np.linspace(0, own.samples - 1, _BOXES).astype(int))
         corners: Array = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
         boxes = [plan[k] + corners * own.at(k)[[i, j], 0] for k in shown]
-        axis.add_collection(
-            PolyCollection(boxes, facecolors=LIGHT, edgecolors="none", zorder=1, label="tube")
-        )
-        axis.plot(*plan.T, color="black", lw=1.0, ls="--", zorder=5, label="plan")
-    obstacles(axis, own.spec, names)
+    figure, axis = plane(own.spec, names, boxes, plan)
     path = campaign.found[0].path
     axis.plot(path[:, i], path[:, j], color=COLORS["l1"], lw=0.5, alpha=0.5)
     axis.plot([], [], color=COLORS["l1"], lw=0.5, label="some runs")
     axis.autoscale_view()
-    axis.set_xlabel(labelled(own.spec, names[0]))
-    axis.set_ylabel(labelled(own.spec, names[1]))
     titled(figure, axis, _title(campaign), 4)
     return figure
+
+
+DRAWERS: Final[Mapping[str, Callable[[Campaign], Figure | None]]] = {"tube_use": _tube_use, "plane": _plane}
