@@ -226,17 +226,12 @@ class Loop:
 def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
     """A loop with its gains; raises `TubecertError` if there are none for it."""
     if setting.model.gained:
-        raise TubecertError([_known_gains_only(setting)])
-    terms, kind, gains, origin, covered = (
-        DESIGNS[controller].terms,
-        name_of(choice.source),
-        None,
-        "no adaptation",
-        False,
-    )
-    if terms.filters:
-        gains, covered = _gains(setting, controller, choice)
-        origin = f"certified by {kind}" if covered else CHOSEN
+        where = setting.spec.location("system.B")
+        message = "parameters known by ranges stand in B, and the loops are stated for a known B"
+        help = "give each of them one value: --set system.parameters.NAME=VALUE"
+        raise TubecertError([Finding(code="TC705", message=message, location=where, help=help)])
+    terms, kind, own = DESIGNS[controller].terms, name_of(choice.source), setting.certified
+    gains, covered = _gains(setting, controller, choice) if terms.filters else (None, False)
     problem = LoopProblem(
         model=setting.model,
         plan=setting.plan,
@@ -245,13 +240,16 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
         times=setting.times,
         gains=gains,
         limit=_LIMIT * setting.greatest_radius,
-        degree=_EVEN_DEGREE if _even(setting.certified) else _DEGREE,
-        P=setting.S.T @ setting.S,
+        degree=_EVEN_DEGREE if _even(own) else _DEGREE,
+        P=own.S.T @ own.S,
         E=setting.E,
         rest=setting.rest,
     )
-    promised = promise(setting.certified, kind) if covered and terms.predicts else None
-    return Loop(problem=problem, origin=origin, promise=promised)
+    return Loop(
+        problem=problem,
+        origin="no adaptation" if gains is None else f"certified by {kind}" if covered else CHOSEN,
+        promise=promise(own, kind) if covered and terms.predicts else None,
+    )
 
 
 def _even(own: Certified) -> bool:
@@ -261,49 +259,25 @@ def _even(own: Certified) -> bool:
 
 def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[LoopGains, bool]:
     """The gains of a loop that filters, and whether they are those that a certificate proves."""
-    adapts = DESIGNS[controller].terms.adapts
-    proven = setting.certified.proven(name_of(choice.source))
+    adapts, kind = DESIGNS[controller].terms.adapts, name_of(choice.source)
+    proven, smooth = setting.certified.proven(kind), setting.spec.adaptation.smooth
     bandwidth = choice.bandwidth or (None if proven is None else proven.bandwidth)
     rate = choice.adaptation_rate or (None if proven is None else proven.adaptation_rate)
     if bandwidth is None or (adapts and rate is None):
-        raise TubecertError([_no_gains(controller, choice, bandwidth is None, adapts and rate is None)])
-    smooth = setting.spec.adaptation.smooth if adapts else None
+        lacks = ("--bandwidth", bandwidth is None), ("--adaptation-rate", adapts and rate is None)
+        options = " and ".join(option for option, missing in lacks if missing)
+        message = f"{kind} certifies no gains for the controller {controller}"
+        help = f"choose {options} (then nothing is covered by the certificate), or another --gains"
+        raise TubecertError([Finding(code="TC705", message=message, help=help)])
+    # R_H where no certificate gives one: Dh, with what the smooth layer needs
+    radius = setting.uncertainty.h * math.sqrt(1 + float(smooth or 0)) * (1 + 1e-6) or 1.0
     gains = LoopGains(
         bandwidth=float(bandwidth),
         adaptation_rate=None if rate is None else float(rate),
-        projection_radius=float(proven.projection_radius) if proven else _radius(setting),
+        projection_radius=float(proven.projection_radius) if proven else radius,
         predictor_gain=float(proven.predictor_gain if proven else bandwidth),
-        smooth=None if smooth is None else float(smooth),
+        smooth=None if smooth is None or not adapts else float(smooth),
     )
-    same = (
-        proven is not None
-        and bandwidth == proven.bandwidth
-        and (not adapts or rate == proven.adaptation_rate)
-    )
-    return gains, same
-
-
-def _radius(setting: Setting) -> float:
-    """R_H where no certificate gives one: Dh, with what the smooth layer needs."""
-    smooth = setting.spec.adaptation.smooth
-    return setting.uncertainty.h * math.sqrt(1 + float(smooth or 0)) * (1 + 1e-6) or 1.0
-
-
-def _no_gains(controller: Controller, choice: Choice, *missing: bool) -> Finding:
-    options = [
-        option for option, own in zip(("--bandwidth", "--adaptation-rate"), missing, strict=True) if own
-    ]
-    return Finding(
-        code="TC705",
-        message=f"{name_of(choice.source)} certifies no gains for the controller {controller}",
-        help=f"choose {' and '.join(options)} (then nothing is covered by the certificate), or another --gains",
-    )
-
-
-def _known_gains_only(setting: Setting) -> Finding:
-    return Finding(
-        code="TC705",
-        message="parameters known by ranges stand in B, and the loops are stated for a known B",
-        location=setting.spec.location("system.B"),
-        help="give each of them one value: --set system.parameters.NAME=VALUE",
-    )
+    if proven is None or bandwidth != proven.bandwidth:
+        return gains, False
+    return gains, not adapts or rate == proven.adaptation_rate
