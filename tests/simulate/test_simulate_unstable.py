@@ -70,7 +70,7 @@ def thinner(where, factor):
 
 def words_of(campaign):
     data = summary(campaign, "none")
-    parts = [verdict_line(data), *report(data, folder="x", files=1, verbose=False)]
+    parts = [verdict_line(data), *report(data, folder="x", files=(), verbose=False)]
     return data.to_json(), "\n".join(
         getattr(part, "plain", getattr(getattr(part, "renderable", None), "plain", "")) for part in parts
     )

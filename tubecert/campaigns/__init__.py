@@ -6,5 +6,5 @@ In: points, figures, summaries. Out: numbers, files. Trusted: no.
 |---|---|
 | `obstacles` | how near points come to an obstacle |
 | `figures` | colours, labels, legends, obstacles in a plane; a figure as files |
-| `folder` | a folder that is tried before any work is done, and is complete when it has its summary |
+| `folder` | a folder that is tried before any work is done, and to which the summary comes last |
 """

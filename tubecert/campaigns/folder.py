@@ -1,4 +1,4 @@
-"""The folder of a campaign: tried before any work is done, and complete when it has its summary. Trusted: no."""
+"""The folder of a campaign: tried before any work is done; its summary comes last. Trusted: no."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import io
 import json
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -46,17 +45,22 @@ def prepared(folder: str) -> Iterator[None]:
 def written_to(
     folder: str, summary: object, files: Iterable[tuple[str, bytes]], outdated: Sequence[str] = ()
 ) -> list[str]:
-    """Writes files, then the summary: a folder that has it is complete. Their names; raises `TargetError`."""
+    """Writes files, then the summary. Their names; raises `TargetError`.
+
+    Who interrupts has the files so far and the summary: the runs are over, and to draw takes seconds.
+    """
     written, text = [], json.dumps(summary, indent=1, sort_keys=True, allow_nan=False) + "\n"
     try:
         for name in (SUMMARY, *outdated):  # of earlier files, which are now replaced
             (Path(folder) / name).unlink(missing_ok=True)
-        for name, data in chain(files, [(SUMMARY, text.encode())]):
-            replace(Path(folder) / name, data)
-            written.append(name)
+        with contextlib.suppress(KeyboardInterrupt):
+            for name, data in files:
+                replace(Path(folder) / name, data)
+                written.append(name)
+        replace(Path(folder) / SUMMARY, text.encode())
     except OSError as error:
         raise _unwritable(folder, error) from None
-    return written
+    return [*written, SUMMARY]
 
 
 def npz(arrays: Mapping[str, NDArray[np.generic]]) -> bytes:

@@ -36,7 +36,6 @@ from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
-    from tubecert.simulate.record import Summary
     from tubecert.spec import Spec
 
 _CODES: Final = {
@@ -83,6 +82,8 @@ def run(given: Given, output: Output) -> ExitCode:
     folder = _folder(given)
     executor = Serial() if given.scheduler is None else cluster_at(given.scheduler)
     from tubecert.campaigns.folder import prepared
+    from tubecert.report.simulation import report as report_of
+    from tubecert.report.simulation import verdict_line
     from tubecert.simulate.files import write
     from tubecert.simulate.record import summary
 
@@ -95,7 +96,12 @@ def run(given: Given, output: Output) -> ExitCode:
             report(Step(phase=Phase.FIGURES))
         files = write(folder, campaign, certificate=certified.hash)
     data = summary(campaign, certified.hash)
-    _report(data, folder, len(files), output, drawn=not campaign.interrupted)
+    present(
+        output,
+        verdict_line(data),
+        lambda: report_of(data, folder=folder, files=files, verbose=output.verbose),
+        _json(data.to_json()) if output.json else None,
+    )
     return _CODES.get(data.outcome, ExitCode.CERTIFIED)
 
 
@@ -168,18 +174,6 @@ def _certificate(
     certificate.write(str(Path(folder) / "certificate.json"), sealed)
     require_tube(result)
     return adopted(system, result), certification_of(sealed).certificate
-
-
-def _report(data: Summary, folder: str, files: int, output: Output, *, drawn: bool) -> None:
-    """The report on stdout, or the summary as JSON, with the verdict line on stderr."""
-    from tubecert.report import simulation
-
-    present(
-        output,
-        simulation.verdict_line(data),
-        lambda: simulation.report(data, folder=folder, files=files, verbose=output.verbose, drawn=drawn),
-        _json(data.to_json()) if output.json else None,
-    )
 
 
 def _tell(line: str) -> None:

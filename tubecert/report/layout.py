@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final, Literal
 
 from rich.padding import Padding
@@ -25,6 +25,12 @@ def indented(item: RenderableType) -> Padding:
 def titled(title: str, body: Iterable[RenderableType]) -> list[RenderableType]:
     """A part of a report, after an empty line."""
     return [Text(), Text(title, style="bold"), *map(indented, body)]
+
+
+def kept_in(folder: str, files: Sequence[str]) -> Text:
+    """What a command has written."""
+    found = Text(f"{len(files)} files ", style="bold", no_wrap=True, overflow="ignore")
+    return found.append(f"in {folder}: {', '.join(files)}", style="not bold")
 
 
 def plain_table(*columns: str, wrapped: int | None = None) -> Table:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tubecert.digits import down, short, up
-from tubecert.report.layout import indented, plain_table
+from tubecert.report.layout import indented, kept_in, plain_table
 from tubecert.report.simulation import CAVEAT, STYLES
 
 if TYPE_CHECKING:
@@ -39,9 +39,7 @@ def report(own: Campaign, *, folder: str, files: Sequence[str], verbose: bool) -
         _shares(own),
         *map(Text, _ranges(own)),
     ]
-    images = " and figures" if any(name.endswith(".png") for name in files) else ""
-    where = Text(f"{len(files)} files in {folder}: summary.json, runs.npz{images}")
-    return [verdict_line(own), *map(indented, parts), where]
+    return [verdict_line(own), *map(indented, parts), kept_in(folder, files)]
 
 
 def _because(own: Campaign) -> str:

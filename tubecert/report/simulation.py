@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tubecert.digits import UNKNOWN, down, short, up
-from tubecert.report.layout import indented, titled
+from tubecert.report.layout import indented, kept_in, titled
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -27,8 +27,6 @@ STYLES: Final = {
     "nothing claimed": "bold",
 }
 CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."
-_DRAWN: Final = " and figures"
-_NOT_DRAWN: Final = "; no figures of what was interrupted"
 _WORDS: Final = {
     "deviation": "|x - x*|",
     "distance": "d(x*, x)",
@@ -67,18 +65,12 @@ def verdict_line(data: Summary) -> Text:
     return line
 
 
-def report(
-    data: Summary, *, folder: str, files: int, verbose: bool, drawn: bool = True
-) -> list[RenderableType]:
-    """The whole report as renderables; `folder` holds the files, figures among them if they were `drawn`."""
+def report(data: Summary, *, folder: str, files: Sequence[str], verbose: bool) -> list[RenderableType]:
+    """The whole report as renderables; `folder` holds the `files`."""
     parts: list[RenderableType] = [verdict_line(data), indented(Text(CAVEAT))]
     for title, body in _sections(data, verbose):
         parts += titled(title, body)
-    where = Text(f"{files} files ", style="bold", no_wrap=True, overflow="ignore").append(
-        f"in {folder}: summary.json, runs.npz{_DRAWN if drawn else _NOT_DRAWN}",
-        style="not bold",
-    )
-    return [*parts, Text(), where]
+    return [*parts, Text(), kept_in(folder, files)]
 
 
 def _because(data: Summary) -> str:
