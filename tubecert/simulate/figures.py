@@ -54,8 +54,7 @@ def _states(campaign: Campaign) -> Figure:
         for item, curve in zip(campaign.drawn, curves, strict=True):
             axis.plot(item.runs.t, curve, **_line(item.loop))
         axis.plot(first.t, plan, color="black", lw=1.0, ls="--", label="plan")
-        tube = np.array([plan.min() - width, plan.max() + width])
-        axis.set_ylim(*_window(tube, curves, 1.5))
+        axis.set_ylim(*_window(np.array([plan.min() - width, plan.max() + width]), curves, 1.5))
         axis.set_ylabel(labelled(setting.spec, name))
     return _over_time(figure, axes[-1], axes[0], campaign)
 
@@ -77,9 +76,8 @@ def _plane(campaign: Campaign) -> Figure | None:
     for end, marker in ((0, "o"), (-1, "s")):
         axis.plot(*plan[end], marker=marker, ms=4, color="black", ls="none", zorder=6)
     tube = np.vstack(shapes)
-    for limit, axis_of, k in ((axis.set_xlim, i, 0), (axis.set_ylim, j, 1)):
-        curves = [item.runs.x[0, :, axis_of] for item in campaign.drawn]
-        limit(*_window(np.array([tube[:, k].min(), tube[:, k].max()]), curves, 0.5))
+    for limit, state, values in zip((axis.set_xlim, axis.set_ylim), (i, j), tube.T, strict=True):
+        limit(*_window(values, [item.runs.x[0, :, state] for item in campaign.drawn], 0.5))
     axis.set_aspect("equal")
     titled(figure, axis, _title(campaign), 5)
     return figure
@@ -172,13 +170,9 @@ DRAWERS: Final[Mapping[str, Callable[[Campaign], Figure | None]]] = {
 
 
 def _line(loop: Loop, about: str = "") -> dict[str, Any]:
-    """How the curves of a loop are drawn: dashed for one that h acts on and that is not meant to stay in the tube."""
-    dashed = loop.controller == "ccm"
-    return {
-        "color": COLORS[loop.controller],
-        "ls": (0, (6, 1.5)) if dashed else "-",
-        "label": about + _NAMES[loop.controller],
-    }
+    """How the curves of a loop are drawn: dashed for the one that nothing adapts and h acts on."""
+    style = (0, (6, 1.5)) if loop.controller == "ccm" else "-"
+    return {"color": COLORS[loop.controller], "ls": style, "label": about + _NAMES[loop.controller]}
 
 
 def _title(campaign: Campaign) -> str:
@@ -195,13 +189,14 @@ def _over_time(figure: Figure, bottom: Axes, top: Axes, campaign: Campaign) -> F
 
 
 def _window(tube: Array, curves: list[Array], room: float) -> tuple[float, float]:
-    """Limits that show the tube (2,) and what stays within some tubes of it; what diverges leaves the picture."""
-    low, high = tube
-    for curve in curves:
-        shown = np.clip(curve[np.isfinite(curve)], *(tube + room * np.array([-1, 1]) * (tube[1] - tube[0])))
-        low, high = min(low, shown.min(initial=low)), max(high, shown.max(initial=high))
-    margin = 0.05 * (high - low)
-    return float(low - margin), float(high + margin)
+    """Limits that show the tube (K,) and what stays within some tubes of it; what diverges leaves the picture."""
+    low, high = tube.min(), tube.max()
+    away = room * (high - low)
+    shown = np.concatenate(
+        [tube, *(np.clip(own[np.isfinite(own)], low - away, high + away) for own in curves)]
+    )
+    margin = 0.05 * np.ptp(shown)
+    return float(shown.min() - margin), float(shown.max() + margin)
 
 
 def _spread(curve: Array) -> Array:

@@ -44,11 +44,9 @@ class RunAt:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stopped:
+class Stopped(RunAt):
     """A run that ended early, and why."""
 
-    run: int
-    t: float | None
     reason: str
 
 
