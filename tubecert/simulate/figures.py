@@ -76,8 +76,8 @@ def _plane(campaign: Campaign) -> Figure | None:
     for end, marker in ((0, "o"), (-1, "s")):
         axis.plot(*plan[end], marker=marker, ms=4, color="black", ls="none", zorder=6)
     tube = np.vstack(shapes)
-    for limit, state, values in zip((axis.set_xlim, axis.set_ylim), (i, j), tube.T, strict=True):
-        limit(*_window(values, [item.runs.x[0, :, state] for item in campaign.drawn], 0.5))
+    axis.set_xlim(*_window(tube[:, 0], [item.runs.x[0, :, i] for item in campaign.drawn], 0.5))
+    axis.set_ylim(*_window(tube[:, 1], [item.runs.x[0, :, j] for item in campaign.drawn], 0.5))
     axis.set_aspect("equal")
     titled(figure, axis, _title(campaign), 5)
     return figure
