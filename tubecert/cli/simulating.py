@@ -73,13 +73,6 @@ def simulate(
         str | None,
         number_option("--members", "Of a family: so many random plans of it share the runs.  [20]"),
     ] = None,
-    replan: Annotated[
-        str | None,
-        number_option(
-            "--replan",
-            "Of a family: a plan is given up every so many s, for one that starts where it is then.",
-        ),
-    ] = None,
     plan: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Of a family: this plan (CSV or specification), if it is one."),
@@ -120,9 +113,8 @@ def simulate(
         raise typer.BadParameter(
             "a certificate has its own specification: --set goes without it", ctx=context
         )
-    if plan is not None and (members is not None or replan is not None):
-        words = "a plan of your own, or random ones: --plan, or --members and --replan"
-        raise typer.BadParameter(words, ctx=context)
+    if plan is not None and members is not None:
+        raise typer.BadParameter("a plan of your own, or random ones: --plan, or --members", ctx=context)
     with guarded(how, deadline):
         from tubecert.cli.simulate import Given, run
 
@@ -144,7 +136,6 @@ def simulate(
                 "seed": seed,
                 "replay": replay,
                 "members": members,
-                "replan": replan,
             },
             folder=output,
             scheduler=scheduler,

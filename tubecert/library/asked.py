@@ -30,7 +30,7 @@ _SETS: Final = {
 }  # options by the keys they set
 _OF_A_METRIC: Final = (
     "rho_a", "epsilon", "metric", "conditions", "bandwidth", "adaptation_rate", "gap", "budget", "deadline",
-    "jobs", "scheduler", "controllers", "gains", "replay", "members", "replan", "plan",
+    "jobs", "scheduler", "controllers", "gains", "replay", "members", "plan",
 )  # fmt: skip
 _OF_SEARCHES: Final = ("deadline", "jobs", "scheduler")
 Named: TypeAlias = Callable[[str], str]

@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Final, cast
 
 from tubecert.certificate.result import Result
@@ -35,8 +36,8 @@ from tubecert.trajectory.make import plan_of
 
 if TYPE_CHECKING:
     from tubecert.simulate.campaign import Campaign
+    from tubecert.simulate.families import Drawing
     from tubecert.simulate.loops import Controller
-    from tubecert.simulate.members import Drawing
     from tubecert.simulate.setting import Setting
 
 _HERE: Final = Serial()
@@ -59,7 +60,6 @@ def simulate(
     bandwidth: Number | None = None,
     adaptation_rate: Number | None = None,
     members: int | None = None,
-    replan: Number | None = None,
     plan: File | None = None,
     progress: Progress | None = None,
 ) -> Simulation | SampledSimulation:
@@ -77,7 +77,6 @@ def simulate(
         seed=seed,
         replay=replay,
         members=members,
-        replan=replan,
     )
     numbers = simulation_numbers(texts, str)
     found = result if isinstance(result, Stated) else read(result)
@@ -145,7 +144,6 @@ class Wishes:
     bandwidth: Fraction | None
     adaptation_rate: Fraction | None
     members: int | None
-    replan: Fraction | None
     plan: str | None
 
 
@@ -171,7 +169,6 @@ class SimulationNumbers:
     seed: int | None
     replay: int | None
     members: int | None
-    replan: Fraction | None
 
 
 def simulation_numbers(given: Mapping[str, str | None], named: Named) -> SimulationNumbers:
@@ -197,7 +194,6 @@ def simulation_numbers(given: Mapping[str, str | None], named: Named) -> Simulat
         seed=whole("seed"),
         replay=whole("replay"),
         members=numbers.count(named("members"), given["members"]),
-        replan=positive("replan"),
     )
     numbers.check()
     return found
@@ -221,7 +217,7 @@ def require_members(system: Spec, wishes: Wishes, named: Named) -> None:
     """Raises TC708 where a plan of a family is asked for, and there is no family."""
     from tubecert.simulate.reading import require_family
 
-    asked = ("members", wishes.members), ("replan", wishes.replan), ("plan", wishes.plan)
+    asked = ("members", wishes.members), ("plan", wishes.plan)
     require_family(system, [named(name) for name, value in asked if value is not None])
 
 
@@ -244,7 +240,6 @@ def wishes_of(
         bandwidth=numbers.bandwidth,
         adaptation_rate=numbers.adaptation_rate,
         members=numbers.members,
-        replan=numbers.replan,
         plan=None if plan is None else os.fspath(plan),
     )
 
@@ -264,7 +259,7 @@ def campaign_of(
     from tubecert.simulate.campaign import follow
     from tubecert.simulate.campaign import simulate as campaign
     from tubecert.simulate.compiled import told
-    from tubecert.simulate.members import members_of
+    from tubecert.simulate.families import members_of
     from tubecert.simulate.setting import Choice, loop_of
 
     setting, drawing = _setting(system, result, wishes)
@@ -290,16 +285,15 @@ def campaign_of(
         further = asked - 1  # the first plan has an adversary of its own
         if drawing is None or not each or not further or own.interrupted:
             return own
-        plans = members_of(drawing, wishes.seed, asked)
+        plans = partial(members_of, drawing, wishes.seed)
         found = follow(setting, loops, plans, asked=further, each=each, seed=wishes.seed, report=report)
-        found = found and replace(found, replan=wishes.replan)
         return replace(own, members=found, interrupted=found is None or found.plans < further)
 
 
 def _setting(system: Spec, result: Result, wishes: Wishes) -> tuple[Setting, Drawing | None]:
     """The setting; of a family that of the plan that is given, or of a random one, and what draws others."""
     from tubecert.model import build
-    from tubecert.simulate.members import drawing_of, member
+    from tubecert.simulate.families import drawing_of, members_of
     from tubecert.simulate.setting import horizon_of, setting_of
 
     if system.trajectory.bundle is None:
@@ -308,11 +302,9 @@ def _setting(system: Spec, result: Result, wishes: Wishes) -> tuple[Setting, Dra
     if wishes.plan is not None:
         own = _member(system, wishes.plan)
         return setting_of(own, result, wishes.duration, plan_of(own, model)), None
-    if wishes.replan is not None and model.time is not None:
-        message = "f depends on t: plans that are given up for others are not drawn for it"
-        raise SpecError([Finding(code="TC708", message=message, help="leave --replan out")])
-    drawing = drawing_of(system, model, horizon_of(system, wishes.duration), wishes.replan)
-    return setting_of(system, result, wishes.duration, member(drawing, wishes.seed, 0)), drawing
+    drawing = drawing_of(system, model, horizon_of(system, wishes.duration))
+    ((plan, _),) = members_of(drawing, wishes.seed, [0])
+    return setting_of(system, result, wishes.duration, plan), drawing
 
 
 def _member(system: Spec, path: str) -> Spec:

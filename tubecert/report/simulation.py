@@ -237,8 +237,6 @@ def _members(members: MembersData) -> Iterator[RenderableType]:
     """What the loops did along further plans of the family."""
     plans, asked = members.plans, members.asked
     drawn = f"{plans} further plans" if plans == asked else f"{plans} of {asked} further plans"
-    if members.replan is not None:
-        drawn += f" (each given up every {short(members.replan)} s for one that starts where it is then)"
     yield Text(
         f"{drawn}, {_runs(members.runs_each)} along each, every one with its own start and uncertainty; x* and "
         f"u* keep to the boxes, |x*' - f - B u*| <= {short(members.largest_defect)} (in many points, not proven)"

@@ -17,7 +17,7 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | `feedback`, `geodesic` | min-norm feedback, disturbance; Chebyshev geodesics by Newton |
 | `reading` | a certificate, read back; what it promises about a loop |
 | `setting` | plan, times, starts and loops with their gains, certified or chosen |
-| `members` | random plans of a family |
+| `families` | random plans of a family |
 | `uncertainty` | random members and adversaries of the certified class |
 | `attack`, `campaign` | random runs and the search for the worst; all that one command simulates |
 | `judge` | runs against promises; distances from obstacles |

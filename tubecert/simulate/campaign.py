@@ -6,12 +6,11 @@ Loops and random runs are one vector of lanes, or several where there are many. 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import partial
-from itertools import islice, takewhile
-from typing import Final
+from itertools import takewhile
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from tubecert.trajectory import Plan
 
 LANES: Final = 128  # random runs of a vector: they are kept, and told of, when all of them are finished
 PLANS: Final = 25  # random plans whose runs are one vector
+Plans: TypeAlias = Callable[[range], Sequence[tuple[Plan, float]]]  # by their numbers, with their defects
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
 _HERE: Final = Serial()
@@ -81,8 +81,7 @@ class Followed:
 class Members:
     """Further random plans of a family: `each` runs of every loop along each; `asked` is how many there were to be.
 
-    `defect` is the largest |x*' - f - B u*| of them that was seen; `replan`: after so many s each is given up for
-    another.
+    `defect` is the largest |x*' - f - B u*| of them that was seen.
     """
 
     asked: int
@@ -90,7 +89,6 @@ class Members:
     each: int
     defect: float
     followed: tuple[Followed, ...]
-    replan: Fraction | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -253,14 +251,14 @@ def _attacked(setting: Setting, attack: Attack, seed: int, report: Progress | No
 def follow(
     setting: Setting,
     loops: Sequence[Loop],
-    plans: Iterator[tuple[Plan, float]],
+    plans: Plans,
     *,
     asked: int,
     each: int,
     seed: int,
     report: Progress | None = None,
 ) -> Members | None:
-    """Every loop that adapts along `asked` plans with their defects, `each` runs along each of them.
+    """Every loop that adapts along `asked` plans from number 1 on, `each` runs along each of them.
 
     Of an interruption what is finished is kept; None if nothing is.
     """
@@ -268,11 +266,12 @@ def follow(
     defects: list[float] = []
     tested = [loop for loop in loops if loop.tested]
     try:
-        while part := [*islice(plans, PLANS)]:
+        for first in range(1, asked + 1, PLANS):
             if report is not None:
                 name, done = "random plans of the family", len(found) * each
                 report(Step(phase=Phase.SIMULATION, name=name, done=done, of=asked * each))
-            found += _along(setting, tested, [plan for plan, _ in part], seed, each, len(found) + 1)
+            part = plans(range(first, min(first + PLANS, asked + 1)))
+            found += _along(setting, tested, [plan for plan, _ in part], seed, each, first)
             defects += [defect for _, defect in part]
     except KeyboardInterrupt:
         pass

@@ -38,7 +38,7 @@ _COMMON: dict[str, object] = {
 }
 KERNELS = (
     "program", "small", "layout", "loops", "geodesic", "feedback", "fast",
-    "stepping", "walking", "compiled", "parts", "pointed",
+    "stepping", "compiled", "parts", "pointed",
 )  # fmt: skip
 
 

@@ -11,10 +11,8 @@ from tubecert.simulate.fast import Fast, exact_flows
 from tubecert.simulate.feedback import Reference
 from tubecert.simulate.layout import layout
 from tubecert.simulate.problem import LoopProblem
-from tubecert.simulate.replanning import Replanned
 from tubecert.simulate.stepping import Grid
 from tubecert.spec import Knots
-from tubecert.trajectory import Plan
 
 _SAME = 1e-11  # of the horizon: times that differ by less are one
 _FEWEST_STEPS = 64
@@ -24,23 +22,15 @@ MOST_STEPS = 4_000_000
 def corners(problem: LoopProblem) -> Array:
     """Times (C,) that must be ends of steps."""
     end = problem.horizon
-    kinks = _kinks(problem.plan)
+    kinks = np.zeros(0) if problem.plan.knots is None else _corners_of(problem.plan.knots)
     every = np.unique(np.minimum(np.concatenate([[0.0, end], problem.times, kinks[kinks < end]]), end))
     t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
     t[-1] = end
     return np.asarray(t)
 
 
-def _kinks(plan: Plan) -> Array:
-    """Times that no step may straddle: corners of u*, ends of pieces on which it is held, switches of plans."""
-    if plan.knots is None:
-        return np.zeros(0)
-    corners = _corners_of(plan.knots)
-    return np.concatenate([corners, plan.spans.hi]) if isinstance(plan, Replanned) else corners
-
-
 def _corners_of(knots: Knots) -> Array:
-    """Where u* has corners, or until when it is held; (K,)."""
+    """Times that no step may straddle: where u* has corners, or until when it is held; (K,)."""
     values = knots.u
     if knots.interpolation == "hermite-simpson":
         return np.array([float(t) for t in knots.t[2::2]])

@@ -112,17 +112,13 @@ class AttackData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MembersData:
-    """Further random plans of a family: run i is along plan i // `runs_each`; the largest defect is a sampled one.
-
-    `replan`: after so many s a plan is given up for another; None: never.
-    """
+    """Further random plans of a family: run i is along plan i // `runs_each`; the largest defect is a sampled one."""
 
     asked: int
     plans: int
     runs_each: int
     largest_defect: float
     loops: tuple[FollowedData, ...]
-    replan: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,7 +207,6 @@ def members_data(found: Members) -> MembersData:
         plans=found.plans,
         runs_each=found.each,
         largest_defect=found.defect,
-        replan=None if found.replan is None else float(found.replan),
         loops=tuple(
             FollowedData(loop=LoopData.of(item.loop), comparison=item.comparison) for item in found.followed
         ),

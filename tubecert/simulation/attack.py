@@ -14,9 +14,10 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert.campaigns.plans import waves
 from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.setting import Size
-from tubecert.simulation.families import drawn, waves
+from tubecert.simulation.families import drawn
 from tubecert.simulation.kernels import Kernels, goals, kernels_of
 from tubecert.simulation.setting import Setting
 

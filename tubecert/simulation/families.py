@@ -1,28 +1,23 @@
 """What the lanes follow: the plan of a specification, or of a family a random plan for every lane.
 
-A plan of a family has square waves as inputs, and turns back by a linear feedback where x* comes near the edge of P; it
-counts as long as x* is in P. Trusted: no.
+A plan of a family (`campaigns.plans`) counts as long as x* is in P. Trusted: no.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from tubecert.campaigns.plans import Steering, integrated, waves
 from tubecert.enclosure.interval import Array
 from tubecert.loop_design.widths import flow
 from tubecert.simulation.setting import Setting
 from tubecert.spec.types import Bundle
 
-Slope: TypeAlias = Callable[[float, Array], Array]
 _AFTER: Final = 1e-9  # of a sample time after its left end: there u* has jumped
-_RICCATI: Final = 2000  # steps of the recursion
-_FULL: Final = 0.7  # of all waves are as large as they may be
-_EDGE: Final = (0.5, 0.9)  # of the ellipsoid: from where to where a plan turns back
-_TINY: Final = 1e-9  # a box that is a point
 
 
 class Course(NamedTuple):
@@ -63,7 +58,8 @@ def course_of(setting: Setting) -> Course:
 def courses(setting: Setting, bundle: Bundle, draws: Array) -> Course:
     """A random plan for every lane from its draws, `drawn(setting)` of each (.., N); N plans."""
     (n, m), K, acts, hold = setting.loop.B.shape, setting.samples, setting.acts, setting.result.claim.hold
-    steer = _Steering(setting, *(np.array(box, dtype=float) for box in (bundle.x, bundle.u)))
+    boxes = (np.array(box, dtype=float) for box in (bundle.x, bundle.u))
+    steer = Steering(*flow(setting.loop.A, setting.loop.B, setting.Ts), *boxes)
     rate = None if bundle.input_rate is None else np.array(bundle.input_rate, dtype=float)[:, None]
     x, u = steer.inside(draws[-n:]), steer.u + np.zeros((1, draws.shape[1]))
     path, held, ends = [x], [], np.full(draws.shape[1], K + 1)
@@ -92,65 +88,3 @@ def drawn(setting: Setting) -> int:
     """How many draws a plan of a family needs."""
     n, m = setting.loop.states, setting.loop.inputs
     return 3 * (n + m) + n
-
-
-def waves(draws: Array, samples: int, k: float) -> Array:
-    """Square waves (c, N) of draws (3 c, N): periods from a sample to the run, most of size 1, others smaller."""
-    period, phase, size = np.split(draws, 3)
-    sign = np.sign(np.sin(2 * np.pi * (k / (2 * float(samples) ** period) + phase)))
-    return np.asarray(np.where(size < _FULL, 1.0, (size - _FULL) / (1 - _FULL)) * sign)
-
-
-def integrated(slope: Slope, t: float, x: Array, length: float, count: int) -> Array:
-    """The states (n, N) a `length` later, by `count` steps of the classical Runge-Kutta method."""
-    h = length / count
-    for s in (t + i * h for i in range(count)):
-        a = slope(s, x)
-        b = slope(s + h / 2, x + h / 2 * a)
-        c = slope(s + h / 2, x + h / 2 * b)
-        d = slope(s + h, x + h * c)
-        x = x + h / 6 * (a + 2 * (b + c) + d)
-    return x
-
-
-class _Steering:
-    """What keeps plans in P (n, 2): inputs in Q (m, 2) as wished, but more and more a linear feedback near its edge.
-
-    Near the edge is where off' `value` off, by the linear-quadratic problem with these boxes as weights, nears 1, which
-    it has where its ellipsoid leaves P.
-    """
-
-    def __init__(self, setting: Setting, P: Array, Q: Array) -> None:
-        (self.x, self.half), (self.u, self.reach) = (
-            (box.mean(axis=1)[:, None], np.ptp(box, axis=1)[:, None] / 2) for box in (P, Q)
-        )
-        A, B = flow(setting.loop.A, setting.loop.B, setting.Ts)
-        size, reach = (np.maximum(half[:, 0], _TINY) for half in (self.half, self.reach))
-        weight, cost = np.diag(1 / size**2), np.diag(1 / reach**2)
-        value: Array = weight
-        for _ in range(_RICCATI):
-            self.gain = np.linalg.solve(cost + B.T @ value @ B, B.T @ value @ A)
-            value = np.asarray(weight + A.T @ value @ (A - B @ self.gain))
-        free = size > _TINY
-        level = (size[free] ** 2 / np.diag(np.linalg.inv(value))[free]).min(initial=np.inf)
-        self.value = value / level
-
-    def within(self, x: Array) -> Array:
-        """Which lanes are in P, (N,)."""
-        return np.asarray((abs(x - self.x) <= self.half).all(axis=0))
-
-    def inside(self, draws: Array) -> Array:
-        """Where plans start, (n, N)."""
-        off = (2 * draws - 1) * self.half
-        return np.asarray(self.x + off * np.sqrt(_EDGE[0] / np.maximum(self._out(off), _EDGE[0])))
-
-    def input(self, x: Array, wish: Array) -> Array:
-        """u* (m, N) in Q for wishes (m, N) from -1 to 1 of it."""
-        off = x - self.x
-        near = np.clip((self._out(off) - _EDGE[0]) / (_EDGE[1] - _EDGE[0]), 0, 1)
-        pushed = (1 - near) * wish * self.reach - near * (self.gain @ off)
-        return np.asarray(self.u + np.clip(pushed, -self.reach, self.reach))
-
-    def _out(self, off: Array) -> Array:
-        """How far out points (n, N) off the middle are: 1 where the ellipsoid ends."""
-        return np.asarray(np.einsum("in,ij,jn->n", off, self.value, off))

@@ -9,10 +9,11 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from tubecert.campaigns.obstacles import in_plane, signed_distance
+from tubecert.campaigns.plans import integrated
 from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.setting import Controller
 from tubecert.simulation.attack import Attack, Flags, Lanes
-from tubecert.simulation.families import Course, integrated
+from tubecert.simulation.families import Course
 from tubecert.simulation.setting import Setting
 
 _ROUNDING: Final = 1e-9  # of a bound: that of floats
