@@ -38,8 +38,6 @@ settings.load_profile("tests")
 # the rewritten assertions of all files and the modules of every `tubecert` that a test starts, compiled once
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-# as the tool has it: some test imports numba before the tool does, and a third more of compilation would be for nothing
-os.environ.setdefault("NUMBA_OPT", "1")
 with suppress(AttributeError):  # another C library
     process.keep_memory()  # as commands do
 gc.set_threshold(
@@ -113,10 +111,7 @@ def barely():
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_the_tests(request, tmp_path_factory):
-    """Plans and checks that the user has kept have no part in tests; what one process of a run keeps, all may read.
-
-    The key stays from run to run, beside pytest's own notes: machine code of the loops need not be compiled again.
-    """
+    """Plans and checks that the user has kept have no part in tests; what one process of a run keeps, all may read."""
     folder = tmp_path_factory.getbasetemp()
     run = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
     with pytest.MonkeyPatch.context() as patch:

@@ -19,7 +19,6 @@ DECIDING: Final = (
     "cvxpy",
     "pyyaml",
     "python-flint",
-    "numba",
     "llvmlite",
 )
 RUNNING: Final = ("distributed",)  # decides who computes, never what

@@ -24,7 +24,6 @@ class Phase(StrEnum):
     VERIFICATION = "verification"  # metrics
     CHECK = "check"  # files
     SWEEP = "sweep"  # points
-    COMPILATION = "compilation"  # functions
     SIMULATION = "simulation"  # runs
     FIGURES = "figures"  # no count
     RECHECK = "recheck"  # claims

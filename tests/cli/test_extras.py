@@ -24,15 +24,14 @@ def test_the_extra_is_what_the_command_needs():
     assert declared == set(EXTRA)
 
 
-@pytest.mark.parametrize("missing", [("numba",), ("matplotlib",), ("numba", "matplotlib")])
-def test_without_it_simulate_says_how_to_install_it(missing, monkeypatch, tmp_path):
+def test_without_it_simulate_says_how_to_install_it(monkeypatch, tmp_path):
     honest = importlib.util.find_spec
     monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *rest: None if name in missing else honest(name, *rest)
+        importlib.util, "find_spec", lambda name, *rest: None if name in EXTRA else honest(name, *rest)
     )
     done = CliRunner().invoke(app, ["simulate", str(ORBIT), "-o", str(tmp_path / "out")])
     assert done.exit_code == 2
-    assert f"error TC122: simulate needs {' and '.join(missing)}" in done.stderr
+    assert "error TC122: simulate needs matplotlib" in done.stderr
     assert "pip install 'tubecert[simulate]'" in done.stderr
     assert not (tmp_path / "out").exists()
 

@@ -25,7 +25,7 @@ ROOMS = [
 MODULES = sorted(PACKAGE.rglob("*.py"))
 HEAVY = {
     "numpy", "scipy", "cvxpy", "clarabel", "yaml", "rich", "pydantic", "matplotlib", "jinja2", "flint",
-    "numba", "distributed",
+    "distributed",
 }  # fmt: skip
 ALLOWED_AT_START = {"typer"}
 FORBIDDEN_CALLS = {"eval", "exec", "compile", "sympify", "safe_load", "unsafe_load", "full_load", "load_all"}

@@ -13,10 +13,8 @@ from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
 from tubecert.simulate.attack import cases
 from tubecert.simulate.engine import integrate
-from tubecert.simulate.fast import generator
-from tubecert.simulate.grid import fast_part
+from tubecert.simulate.flows import Fast
 from tubecert.simulate.judge import compare
-from tubecert.simulate.layout import slices
 from tubecert.simulate.setting import Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
@@ -220,18 +218,14 @@ def test_the_loop_is_the_one_in_the_coordinates_of_the_tube():
     result = certify(load_text(joint(12)), COARSE)
     setting = setting_of(load_text(joint(12)), result)
     loop = loop_of(setting, "l1", Choice(source="distance"))
-    S, P = setting.S, loop.problem.P
-    assert not np.allclose(P, np.eye(4))
-    lengths = np.array([0.01])
-    own = fast_part(loop.problem, lengths, 0)
+    S, problem = setting.S, loop.problem
+    assert not np.allclose(problem.P, np.eye(4))
+    own, its = (Fast(problem.terms, problem.gains, P, 1, 1) for P in (problem.P, np.eye(4)))
     B = np.array([[0.0], [0.0], [0.0], [2 / 12]])
-    L, E = generator(own, B)
-    L_z, E_z = generator(own._replace(P=np.eye(4)), S @ B)
-    y = slices(own.at)
-    T = np.eye(own.at.size)
-    T[y.xtilde, y.xtilde] = T[y.v, y.v] = S
-    assert T @ L @ np.linalg.inv(T) == pytest.approx(L_z)
-    assert pytest.approx(E_z) == T @ E
+    flow, flow_z = own.flow(B, 0.01, 0), its.flow(S @ B, 0.01, 0)
+    T = np.eye(flow.part.shape[0])
+    T[own.at.xi, own.at.xi] = S
+    assert T @ flow.part @ np.linalg.inv(T) == pytest.approx(flow_z.part)
 
 
 @pytest.mark.slow

@@ -46,7 +46,7 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
     theta = np.array([[0.31, 0.02]])
     moved = replace(still, beside=still.beside._replace(theta=theta))
     x0 = np.array([[0.05, 0.0]])
-    found = integrate(problem, x0, moved, tolerance=1e-10)
+    found = integrate(problem, x0, moved, tolerance=1e-5)
     M = np.linalg.inv(np.array([[1, -0.3], [-0.3, 2]]))
     B = np.array([0.0, 1.0])
 
@@ -60,8 +60,8 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
         return f(x) + B * k + np.array([0.02 * np.cos(x[0]), 0.0])  # what no input reaches
 
     own = solve_ivp(slope, (0, 2), x0[0], rtol=1e-10, atol=1e-12, t_eval=problem.times)
-    np.testing.assert_allclose(found.x[0], own.y.T, atol=1e-6)
-    at_rest = integrate(problem, x0, still, tolerance=1e-10)
+    np.testing.assert_allclose(found.x[0], own.y.T, atol=1e-5)
+    at_rest = integrate(problem, x0, still, tolerance=1e-5)
     assert np.abs(at_rest.x - found.x).max() > 1e-3
 
 

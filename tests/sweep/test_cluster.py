@@ -147,7 +147,7 @@ def test_where_there_is_no_cluster_that_is_said(monkeypatch):
 
 def test_random_runs_on_a_cluster_are_those_of_this_machine(cluster, monkeypatch):
     monkeypatch.setattr(campaign, "LANES", 2)
-    monkeypatch.setattr(campaign, "worst", lambda where, loop, seed, report: cases(where, seed, [0]))
+    monkeypatch.setattr(campaign, "worst", lambda where, loop, seed, *more: cases(where, seed, [0]))
     where = setting("flat", duration="1")
     loops = [loop_of(where, "l1", Choice())]
     here, there = (

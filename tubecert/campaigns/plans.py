@@ -54,7 +54,7 @@ class Steering:
         weight, cost = np.diag(1 / size**2), np.diag(1 / reach**2)
         value: Array = weight
         for _ in range(_RICCATI):
-            self.gain = np.linalg.solve(cost + B.T @ value @ B, B.T @ value @ A)
+            self.gain = np.asarray(np.linalg.solve(cost + B.T @ value @ B, B.T @ value @ A), dtype=float)
             value = np.asarray(weight + A.T @ value @ (A - B @ self.gain))
         free = size > _TINY
         level = (size[free] ** 2 / np.diag(np.linalg.inv(value))[free]).min(initial=np.inf)
@@ -66,7 +66,7 @@ class Steering:
 
     def inside(self, draws: Array, wide: Array | float = 1.0) -> Array:
         """Where plans start, (n, N), in an ellipsoid that is wider by sqrt(`wide`)."""
-        off = np.asarray((2 * draws - 1) * self.half)
+        off = np.asarray((2 * draws - 1) * self.half, dtype=float)
         return np.asarray(self.x + off * np.sqrt(_EDGE[0] / np.maximum(self._out(off) / wide, _EDGE[0])))
 
     def input(self, x: Array, wish: Array, wide: Array | float = 1.0) -> Array:

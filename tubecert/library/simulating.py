@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from tubecert.simulate.setting import Setting
 
 _HERE: Final = Serial()
-EXTRA: Final = ("numba", "llvmlite", "matplotlib")
+EXTRA: Final = ("matplotlib",)
 RUNS: Final = 100
 MEMBERS: Final = 20  # random plans of a family
 SEED: Final = 0
@@ -258,7 +258,6 @@ def campaign_of(
     """Every loop that is wished for, integrated and attacked; random runs are those of the `executor`."""
     from tubecert.simulate.campaign import follow
     from tubecert.simulate.campaign import simulate as campaign
-    from tubecert.simulate.compiled import told
     from tubecert.simulate.families import members_of
     from tubecert.simulate.setting import Choice, loop_of
 
@@ -272,22 +271,21 @@ def campaign_of(
     loops = [loop_of(setting, cast("Controller", name), choice) for name in names]
     asked = MEMBERS if wishes.members is None else wishes.members
     each = wishes.runs if drawing is None else -(-wishes.runs // asked)
-    with told(report):
-        own = campaign(
-            setting,
-            loops,
-            count=each,
-            seed=wishes.seed,
-            replay=wishes.replay,
-            report=report,
-            executor=executor,
-        )
-        further = asked - 1  # the first plan has an adversary of its own
-        if drawing is None or not each or not further or own.interrupted:
-            return own
-        plans = partial(members_of, drawing, wishes.seed)
-        found = follow(setting, loops, plans, asked=further, each=each, seed=wishes.seed, report=report)
-        return replace(own, members=found, interrupted=found is None or found.plans < further)
+    own = campaign(
+        setting,
+        loops,
+        count=each,
+        seed=wishes.seed,
+        replay=wishes.replay,
+        report=report,
+        executor=executor,
+    )
+    further = asked - 1  # the first plan has an adversary of its own
+    if drawing is None or not each or not further or own.interrupted:
+        return own
+    plans = partial(members_of, drawing, wishes.seed)
+    found = follow(setting, loops, plans, asked=further, each=each, seed=wishes.seed, report=report)
+    return replace(own, members=found, interrupted=found is None or found.plans < further)
 
 
 def _setting(system: Spec, result: Result, wishes: Wishes) -> tuple[Setting, Drawing | None]:

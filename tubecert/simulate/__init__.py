@@ -6,15 +6,12 @@ falsify a certificate and never supports one; no trusted room imports this one. 
 | module | what it does |
 |---|---|
 | `problem`, `loops`, `runs` | what is simulated, the terms of the loops, and what comes out |
-| `engine` | batches of lanes |
-| `integrator` | steps are halved until the error estimate is small enough; lanes on all cores |
-| `grid` | the times of the steps, the plan at them, and the fast part's exact steps |
-| `program` | expressions as arrays for one compiled interpreter |
-| `compiled`, `sealed` | compilation; machine code kept between runs, and run only under the user's own seal |
-| `layout` | the blocks of the fast part's state: the only place that counts entries |
-| `stepping` | one lane: RK4 on the slow part, with the flow of the fast part inside |
-| `fast` | (xtilde, sigma_hat, u_a): exact where linear, resolved while projecting |
-| `feedback`, `geodesic` | min-norm feedback, disturbance; Chebyshev geodesics by Newton |
+| `engine` | steps are halved until the error estimate of every lane is small enough |
+| `lanes` | runs as lanes of one vector: Runge-Kutta steps of any system, peaks, what is seen at output times |
+| `continuous` | the loops as such a system: feedback, and the stages around the fast part |
+| `flows` | (xtilde, sigma_hat, u_a): exact where linear, and caught at the ball of the projection |
+| `acting` | the plant's terms, the disturbance, wind and parameters of every lane |
+| `geodesics`, `times` | Chebyshev geodesics; the times of the steps, and the plan at them |
 | `reading` | a certificate, read back; what it promises about a loop |
 | `setting` | plan, times, starts and loops with their gains, certified or chosen |
 | `families` | random plans of a family |

@@ -240,7 +240,7 @@ def _sampled(setting: Setting, loop: Loop, runs: Runs, count: int, seed: int) ->
 def _attacked(setting: Setting, attack: Attack, seed: int, report: Progress | None) -> Attack:
     """With the adversary's run, if nobody interrupts."""
     try:
-        found = worst(setting, attack.loop, seed, report)
+        found = worst(setting, attack.loop, seed, attack.sample.runs, report)
         (runs,) = integrate([found.of(attack.loop.problem)], tolerance=setting.tolerance)
     except KeyboardInterrupt:
         return attack

@@ -197,3 +197,37 @@ class Disturbance:
             radius=np.full(lanes, np.inf),
             centre=np.zeros(n),
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Batch:
+    """N runs of a loop from x0 (N, n) under a disturbance of N lanes. ValueError where these do not fit."""
+
+    problem: LoopProblem
+    x0: Array
+    disturbance: Disturbance
+
+    def __post_init__(self) -> None:
+        N, n = self.x0.shape
+        model, own = self.problem.model, self.disturbance
+        if n != len(model.states) or own.lanes != N or len(own.centre) != n:
+            raise ValueError(f"x0 of shape {self.x0.shape} does not fit the disturbance's {own.lanes} lanes")
+        if own.amplitude.shape[2] != len(model.inputs):
+            raise ValueError("the disturbance has another number of inputs than the model")
+
+    @property
+    def acting(self) -> Disturbance:
+        """What acts on the loop: nothing on one that is run without any disturbance."""
+        if DESIGNS[self.problem.controller].disturbed:
+            return self.disturbance
+        return Disturbance.from_expressions(None, self.problem.model, len(self.x0))
+
+    def of(self, lanes: NDArray[np.intp]) -> Batch:
+        """Some of the runs, given by their numbers."""
+        return replace(self, x0=self.x0[lanes], disturbance=self.disturbance.of(lanes))
+
+    def beside(self, other: Batch) -> bool:
+        """Whether both can be lanes of one vector: of the same model, plan and times."""
+        own, its = self.problem, other.problem
+        same = own.model is its.model and own.plan is its.plan and own.horizon == its.horizon
+        return same and own.degree == its.degree and np.array_equal(own.times, its.times)

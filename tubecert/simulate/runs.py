@@ -48,17 +48,17 @@ class Failure:
 class Runs:
     """N runs at K output times.
 
-    Shapes: t (K,), x (N, K, n), x_plan (K, n), u_plan (K, m), k, u_a, sigma_hat and h (N, K, m), xtilde (N, K, n),
-    distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts (with a control rate: what is held; u_a
-    is then the held one, and k contains the held plan's difference to u_plan). A quantity that a loop does not have is
-    0. `least` and `greatest` (N, m) are of every input, over all steps. After a lane was stopped its values are nan.
-    `error` (N,) is the largest difference in |S x| to the run with steps twice as long, an estimate of the error and
-    mostly far above it; it is inf for a lane that was stopped. `unresolved` (N,) is the first output time at which that
-    difference exceeds the tolerance, nan where it never does.
+    Shapes: t (K,), x and x' = `slope` (N, K, n), x_plan (K, n), u_plan (K, m), k, u_a, sigma_hat and h (N, K, m),
+    xtilde (N, K, n), distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts. A quantity that a
+    loop does not have is 0. `least` and `greatest` (N, m) are of every input, over all steps. After a lane was stopped
+    its values are nan. `error` (N,) is the largest difference in |S x| to the run with steps twice as long, or an
+    eighth of the one before, an estimate of the error and mostly above it; it is inf for a lane that was stopped.
+    `unresolved` (N,) is the first output time at which that difference exceeds the tolerance, nan where it never does.
     """
 
     t: Array
     x: Array
+    slope: Array
     x_plan: Array
     u_plan: Array
     k: Array
@@ -74,6 +74,7 @@ class Runs:
     unresolved: Array
     failures: tuple[Failure, ...]
     steps: NDArray[np.int64]  # (N,), how many steps the run took
+    level: NDArray[np.int64]  # (N,), how often its steps were halved
 
     @property
     def u(self) -> Array:
@@ -108,19 +109,8 @@ def joined(parts: list[Runs]) -> Runs:
         )
         for item in fields(Worst)
     }
-    lanewise = (
-        "x",
-        "k",
-        "u_a",
-        "sigma_hat",
-        "h",
-        "xtilde",
-        "distance",
-        "error",
-        "unresolved",
-        "least",
-        "greatest",
-    )
+    lanewise = ["x", "slope", "k", "u_a", "sigma_hat", "h", "xtilde", "distance"]
+    lanewise += ["error", "unresolved", "least", "greatest"]
     return Runs(
         t=parts[0].t,
         x_plan=parts[0].x_plan,
@@ -128,5 +118,6 @@ def joined(parts: list[Runs]) -> Runs:
         worst=Worst(**peaks),
         failures=failures,
         steps=np.concatenate([part.steps for part in parts]),
+        level=np.concatenate([part.level for part in parts]),
         **{name: stacked(name) for name in lanewise},
     )

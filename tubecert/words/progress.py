@@ -20,7 +20,6 @@ COUNTED: Final = {
     Phase.VERIFICATION: "metrics",
     Phase.CHECK: "files",
     Phase.SWEEP: "points",
-    Phase.COMPILATION: "functions",
     Phase.SIMULATION: "runs",
 }
 _AT: Final = {
@@ -32,7 +31,6 @@ _AT: Final = {
     Phase.VERIFICATION: "verifying",
     Phase.CHECK: "checking",
     Phase.SWEEP: "certifying points",
-    Phase.COMPILATION: "compiling the loops, once per installation",
     Phase.SIMULATION: "simulating",
     Phase.FIGURES: "figures and data",
     Phase.RECHECK: "examining",
@@ -46,7 +44,6 @@ _NEXT: Final = {
     Phase.VERIFICATION: "a smaller safe set, a wider --gap, or more time",
     Phase.CHECK: "fewer files, or --jobs",
     Phase.SWEEP: "the same command goes on where it ended",
-    Phase.COMPILATION: "the same command: what is compiled is kept",
     Phase.SIMULATION: "fewer --runs, or --controllers for some only",
     Phase.FIGURES: "the same command once more",
     Phase.RECHECK: "a smaller --budget tells earlier which claims are hard",

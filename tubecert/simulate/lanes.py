@@ -1,0 +1,155 @@
+"""Runs as lanes of one vector, from start to end: Runge-Kutta steps of any system, and what is seen of every lane.
+
+Arrays have the lanes last. The stages are those of the classical method; what a system does beside its slopes, such as
+an exact flow within the step, it adds to them (`System`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.enclosure.interval import Array
+
+_CHUNK: Final = 128  # steps whose peaks are taken at once
+_WEIGHTS: Final = (1.0, 2.0, 2.0, 1.0)
+SHARES: Final = (0.0, 0.5, 0.5, 1.0)  # of a step, stage by stage
+
+
+class System(Protocol):
+    """What N lanes do; numbers of steps are those of the times that it was made for.
+
+    `stopped` (N,) is 0 for the lanes that go on; the others may have any values.
+    """
+
+    stopped: NDArray[np.int64]
+
+    def start(self) -> Array:
+        """x (n, N) at the start."""
+
+    def at(self, step: int, stage: int, x: Array) -> Array:
+        """The slope (n, N) at a stage, to which the slope of the stage before leads from the start of the step."""
+
+    def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
+        """What is seen of the lanes at the start of a step, (.., N), after its first stage; `u` (m, N) the inputs."""
+
+    def step(self, step: int) -> Array | float:
+        """Goes to the end of a step, after its last stage; what that adds to x."""
+
+    def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
+        """What peaks are taken of, (S, N), from what was seen at S instants, (S, .., N)."""
+
+
+class Found(NamedTuple):
+    """What N lanes leave behind.
+
+    `seen` (K, .., N) at the output times, nan where they did not come; `peak` and `peak_time` (N,) by name; `least` and
+    `greatest` (m, N) of the inputs; why (0: it was not) and when a lane was `stopped`, `ended` (N,).
+    """
+
+    seen: dict[str, Array]
+    peak: dict[str, Array]
+    peak_time: dict[str, Array]
+    least: Array
+    greatest: Array
+    stopped: NDArray[np.int64]
+    ended: Array
+
+
+def follow(system: System, start: Array, length: Array, outputs: NDArray[np.int64]) -> Found:
+    """All steps from `start` on, (S + 1,) in s, the last of length 0; `outputs` (K,) begin at the output times."""
+    record, x, last = _Record(system, start, outputs), system.start(), len(start) - 1
+    with np.errstate(all="ignore"):
+        for step in range(len(start)):
+            slope = system.at(step, 0, x)
+            record.see(step, x, slope)
+            if step < last:
+                x = _stepped(system, step, float(length[step]), x, slope)
+            if record.all_stopped(step):
+                break
+        return record.closed()
+
+
+def _stepped(system: System, step: int, length: float, x: Array, slope: Array) -> Array:
+    """x at the end of a step."""
+    total = slope
+    for stage in (1, 2, 3):
+        slope = system.at(step, stage, x + SHARES[stage] * length * slope)
+        total = total + _WEIGHTS[stage] * slope
+    return np.asarray(x + length / 6 * total + system.step(step))
+
+
+class _Record:
+    """What is left behind so far, and the rows of the steps since peaks were last taken."""
+
+    def __init__(self, system: System, start: Array, outputs: NDArray[np.int64]) -> None:
+        self._system, self._start, self._outputs = system, start, outputs
+        self._rows, self._alive, self._first = list[dict[str, Array]](), list[NDArray[np.bool_]](), 0
+        self._found: Found | None = None
+        self._ended = np.zeros(0)
+
+    def see(self, step: int, x: Array, slope: Array) -> None:
+        """Keeps what is seen of the lanes that have come to a step."""
+        self._rows.append(self._system.instant(step, x, slope))
+        self._alive.append(self._system.stopped == 0)
+        if len(self._rows) == _CHUNK:
+            self._take()
+
+    def all_stopped(self, step: int) -> bool:
+        """Whether no lane goes on beyond a step; when they were stopped is kept."""
+        stopped = self._system.stopped != 0
+        if not stopped.any():
+            return False
+        if not len(self._ended):
+            self._ended = np.full(len(stopped), np.nan)
+        self._ended[stopped & np.isnan(self._ended)] = self._start[step]
+        return bool(stopped.all())
+
+    def _take(self) -> None:
+        """Peaks of the rows so far, and those of them that are at output times."""
+        rows = {name: np.stack([row[name] for row in self._rows]) for name in self._rows[0]}
+        alive, sizes = np.stack(self._alive), self._system.sizes(rows)
+        if self._found is None:
+            self._found = self._nothing(rows, sizes)
+        found, t = self._found, self._start[self._first : self._first + len(alive)]
+        lanes = np.arange(alive.shape[1])
+        for name, size in sizes.items():
+            best = np.argmax(np.where(alive, size, -np.inf), axis=0)
+            value, peak = np.where(alive, size, -np.inf)[best, lanes], found.peak[name]
+            higher = value > peak
+            peak[higher], found.peak_time[name][higher] = value[higher], t[best[higher]]
+        live = alive[:, None]
+        np.minimum(found.least, np.where(live, rows["u"], np.inf).min(axis=0), out=found.least)
+        np.maximum(found.greatest, np.where(live, rows["u"], -np.inf).max(axis=0), out=found.greatest)
+        low, high = np.searchsorted(self._outputs, [self._first, self._first + len(alive)])
+        own = self._outputs[low:high] - self._first
+        for name, seen in found.seen.items():
+            part = rows[name][own]
+            seen[low:high] = np.where(alive[own] if part.ndim == 2 else live[own], part, np.nan)
+        self._first += len(alive)
+        self._rows.clear()
+        self._alive.clear()
+
+    def _nothing(self, rows: Mapping[str, Array], sizes: Mapping[str, Array]) -> Found:
+        K, N, inputs = len(self._outputs), len(self._system.stopped), rows["u"].shape[1:]
+        return Found(
+            seen={name: np.full((K, *part.shape[1:]), np.nan) for name, part in rows.items()},
+            peak={name: np.zeros(N) for name in sizes},
+            peak_time={name: np.zeros(N) for name in sizes},
+            least=np.full(inputs, np.inf),
+            greatest=np.full(inputs, -np.inf),
+            stopped=self._system.stopped,
+            ended=np.full(N, np.nan),
+        )
+
+    def closed(self) -> Found:
+        """All that was found."""
+        if self._rows:
+            self._take()
+        assert self._found is not None
+        if len(self._ended):
+            self._found.ended[:] = self._ended
+        return self._found
