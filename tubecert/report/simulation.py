@@ -27,6 +27,7 @@ STYLES: Final = {
     "nothing claimed": "bold",
 }
 CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."
+_COUNTED: Final = ("controller", "runs", "left the tube", "no result", "max d/bound", "settled")
 _WORDS: Final = {
     "deviation": "|x - x*|",
     "distance": "d(x*, x)",
@@ -40,11 +41,13 @@ _WORDS: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Part:
-    """Runs of a loop, and what they are about; `{run}` stands for the number of a run."""
+    """Runs of a loop, and what they are about; `each`: what one of many is, which `--replay` may show alone."""
 
     loop: LoopData
     comparison: Comparison
     what: str
+    each: str = ""
+    replayed: bool = False
 
     @property
     def counts(self) -> bool:
@@ -53,7 +56,7 @@ class _Part:
 
     def run(self, item: RunAt | Stopped | Violation) -> str:
         """Which run it was."""
-        return self.what.replace("{run}", str(item.run))
+        return f"{self.each} {item.run}, {self.what}" if self.each else self.what
 
 
 def verdict_line(data: Summary) -> Text:
@@ -108,16 +111,19 @@ def _parts(data: Summary) -> Iterator[_Part]:
     """Every comparison, with what it is about."""
     for own in data.loops:
         yield _Part(loop=own.loop, comparison=own.comparison, what=f"uncertainty {data.uncertainty}")
+    seed = f"seed {data.seed}"
     for attack in data.attacks:
-        for found, words in (
-            (attack.random, f"random run {{run}}, seed {data.seed}"),
-            (attack.adversary, f"adversary, seed {data.seed}"),
-        ):
-            if found is not None:
-                yield _Part(loop=attack.loop, comparison=found.comparison, what=words)
+        random, worst = attack.random, attack.adversary
+        yield _Part(
+            loop=attack.loop, comparison=random.comparison, what=seed, each="random run", replayed=True
+        )
+        if worst is not None:
+            yield _Part(loop=attack.loop, comparison=worst.comparison, what=f"adversary, {seed}")
     if (members := data.members) is not None:
-        words = f"random plans, run {{run}} ({members.runs_each} along each), seed {data.seed}"
-        yield from (_Part(loop=own.loop, comparison=own.comparison, what=words) for own in members.loops)
+        words, each = f"{members.runs_each} along each, {seed}", "random plans, run"
+        yield from (
+            _Part(loop=own.loop, comparison=own.comparison, what=words, each=each) for own in members.loops
+        )
 
 
 def _sections(data: Summary, verbose: bool) -> Iterator[tuple[str, list[RenderableType]]]:
@@ -155,7 +161,7 @@ def _violation(part: _Part, item: Violation) -> Text:
     where, name = part.run(item), _WORDS.get(item.bound_of, item.bound_of)
     what = f"{part.loop.controller}: {name} is {short(item.value, 6)}"
     text = Text(f"{what}, promised at most {short(item.bound, 6)}; {_when(item)}{where}", "red")
-    if "random run" in where:
+    if part.replayed:
         text.append(f"\n  to see it alone: the same command with --replay {item.run}", style="default")
     return text
 
@@ -175,14 +181,9 @@ def _unresolved(part: _Part, item: RunAt) -> Text:
 def _loops(data: Summary) -> Table:
     table = _table("controller", "gains", "are", "max d/bound", "max |x-x*|/bound", "settled")
     for own in data.loops:
-        settled = own.comparison.settled
+        shares = (_share(own.comparison, name) for name in ("distance", "deviation"))
         table.add_row(
-            own.loop.controller,
-            _gain_words(own.loop),
-            own.loop.gains_are,
-            _share(own.comparison, "distance"),
-            _share(own.comparison, "deviation"),
-            UNKNOWN if settled is None else f"{short(settled)} s",
+            own.loop.controller, _gain_words(own.loop), own.loop.gains_are, *shares, _settled(own.comparison)
         )
     return table
 
@@ -191,14 +192,12 @@ def _gain_words(loop: LoopData) -> str:
     gains = loop.gains
     if gains is None:
         return UNKNOWN
-    words = ["no filter" if gains.bandwidth is None else f"omega {short(gains.bandwidth)}"]
-    if gains.adaptation_rate is not None:
-        words.append(f"Gamma {short(gains.adaptation_rate)}")
-    return ", ".join(words)
+    Gamma = "" if gains.adaptation_rate is None else f", Gamma {short(gains.adaptation_rate)}"
+    return f"omega {short(gains.bandwidth)}{Gamma}"
 
 
-def _share(own: Comparison | None, name: str) -> str:
-    use = None if own is None else own.worst.get(name)
+def _share(own: Comparison, name: str) -> str:
+    use = own.worst.get(name)
     if use is None or use.share is None:
         return UNKNOWN
     return f"{short(use.share)} at {short(use.t)} s"
@@ -213,24 +212,26 @@ def _class(data: Summary) -> Text:
 
 
 def _attacks(data: Summary) -> Table:
-    table = _table("controller", "runs", "left the tube", "no result", "max d/bound", "adversary", "settled")
+    table = _table(*_COUNTED, "adversary")
     for attack in data.attacks:
-        found = None if attack.random is None else attack.random.comparison
-        runs = settled = UNKNOWN
-        if attack.random is not None and found is not None:
-            asked = attack.random.asked
-            runs = str(found.runs) + (f" of {asked}" if found.runs < asked else "")
-            settled = UNKNOWN if found.settled is None else f"{short(found.settled)} s"
-        table.add_row(
-            attack.loop.controller,
-            runs,
-            UNKNOWN if found is None else str(found.left_the_tube),
-            UNKNOWN if found is None else str(found.no_result),
-            _share(found, "distance"),
-            _share(None if attack.adversary is None else attack.adversary.comparison, "distance"),
-            settled,
-        )
+        found = attack.random.comparison
+        worst = UNKNOWN if attack.adversary is None else _share(attack.adversary.comparison, "distance")
+        table.add_row(*_counted(attack.loop, found, attack.random.asked), worst)
     return table
+
+
+def _counted(loop: LoopData, found: Comparison, asked: int) -> Iterator[str]:
+    """A row of `_COUNTED`."""
+    yield loop.controller
+    yield str(found.runs) + (f" of {asked}" if found.runs < asked else "")
+    yield str(found.left_the_tube)
+    yield str(found.no_result)
+    yield _share(found, "distance")
+    yield _settled(found)
+
+
+def _settled(found: Comparison) -> str:
+    return UNKNOWN if found.settled is None else f"{short(found.settled)} s"
 
 
 def _members(members: MembersData) -> Iterator[RenderableType]:
@@ -241,17 +242,9 @@ def _members(members: MembersData) -> Iterator[RenderableType]:
         f"{drawn}, {_runs(members.runs_each)} along each, every one with its own start and uncertainty; x* and "
         f"u* keep to the boxes, |x*' - f - B u*| <= {short(members.largest_defect)} (in many points, not proven)"
     )
-    table = _table("controller", "runs", "left the tube", "no result", "max d/bound", "settled")
+    table = _table(*_COUNTED)
     for own in members.loops:
-        found = own.comparison
-        table.add_row(
-            own.loop.controller,
-            str(found.runs),
-            str(found.left_the_tube),
-            str(found.no_result),
-            _share(found, "distance"),
-            UNKNOWN if found.settled is None else f"{short(found.settled)} s",
-        )
+        table.add_row(*_counted(own.loop, own.comparison, own.comparison.runs))
     yield table
 
 
@@ -310,9 +303,5 @@ def _gains(loop: LoopData, gains: GainsData) -> Text:
     )
 
 
-def _table(first: str, *others: str) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
-    table.add_column(first)
-    for name in others:
-        table.add_column(name)
-    return table
+def _table(*columns: str) -> Table:
+    return Table(*columns, box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")

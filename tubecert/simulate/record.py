@@ -106,7 +106,7 @@ class AttackData:
 
     loop: LoopData = field(metadata=INLINE)
     largest_distance_over_dbar: float | None
-    random: RandomData | None = None
+    random: RandomData
     adversary: AdversaryData | None = None
 
 
