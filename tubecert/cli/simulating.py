@@ -71,11 +71,11 @@ def simulate(
     ] = None,
     members: Annotated[
         str | None,
-        number_option("--members", "Of a family: so many random plans of it share the runs.  [20]"),
+        number_option("--members", "Of a family without hardware: random plans that share the runs.  [20]"),
     ] = None,
     plan: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Of a family: this plan (CSV or specification), if it is one."),
+        typer.Option(metavar="FILE", help="... this plan (CSV or specification), if it is one."),
     ] = None,
     duration: Annotated[
         str | None, number_option("--duration", "How long, in s.  [the horizon, else 10/rate]")
