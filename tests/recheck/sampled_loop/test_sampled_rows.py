@@ -16,8 +16,8 @@ from scipy.optimize import linprog
 from tubecert.recheck.document import Node
 from tubecert.recheck.obstacles import Obstacle
 from tubecert.recheck.plans import Plan
+from tubecert.recheck.sampled_loop.claims import _apart
 from tubecert.recheck.sampled_loop.loop import Loop, parted
-from tubecert.recheck.sampled_loop.obstacles import _apart
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.remainders import Remainders, Size, Slow
 from tubecert.recheck.sampled_loop.theorem import Inequalities, Phase, phases_of

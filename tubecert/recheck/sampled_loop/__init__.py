@@ -7,6 +7,6 @@ In: a document of its format. Out: claims, as of every certificate. Trusted: yes
 | `record` | the certificate, read into closed types |
 | `windows`, `remainders` | the plan in windows; suprema on the tube |
 | `loop`, `theorem` | the loop over a sample; the inequalities at every sample |
-| `obstacles`, `claims` | what else is claimed; all claims in their order |
-| `held`, `exported` | the plan and the code of a controller in C |
+| `claims` | all claims in their order, and those about obstacles |
+| `exported` | a controller in C against its certificate |
 """

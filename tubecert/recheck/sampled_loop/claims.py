@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property, partial
-from math import ceil
+from itertools import pairwise
+from math import ceil, inf, isfinite
 
 from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, exact
+from tubecert.recheck.clearances import along, contains, somewhere
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.cover import Range as Ends
+from tubecert.recheck.curve import Segment
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.metric import CONFIRMED, smooth, stated, together
+from tubecert.recheck.obstacles import Obstacle, Point
 from tubecert.recheck.planned import serves
 from tubecert.recheck.reading import TIME
-from tubecert.recheck.sampled_loop.held import single
 from tubecert.recheck.sampled_loop.loop import Loop, column, joined, sizes
-from tubecert.recheck.sampled_loop.obstacles import cleared
-from tubecert.recheck.sampled_loop.record import Certificate, Proven
+from tubecert.recheck.sampled_loop.record import Certificate, Proven, Stage, single
 from tubecert.recheck.sampled_loop.remainders import PLAN, Remainders, Size, Slow
 from tubecert.recheck.sampled_loop.theorem import Inequalities, Phase, phases_of
 from tubecert.recheck.sampled_loop.windows import Course, course_of
@@ -43,16 +46,13 @@ def of(certificate: Certificate, budget: int) -> Iterator[Claim]:
     )
     yield Claim("the hash is that of the result", None, lambda: stated(same, "something was changed"))
     repeated = {**certificate.repeated, **(proven.repeated if proven else {})}
-    wrong = (
-        stated(False, f"{path} is not what the specification has")
-        for path, (given, own) in repeated.items()
-        if given != own
-    )
-    yield Claim("the specification and what repeats it", None, lambda: next(wrong, CONFIRMED))
+    wrong = ", ".join(path for path, (given, own) in repeated.items() if given != own)
+    why = f"not what the specification has: {wrong}"
+    yield Claim("the specification and what repeats it", None, lambda: stated(not wrong, why))
     if proven is None:
         return
     case = Case(spec, proven, budget)
-    yield Claim("limits are kept, and obstacles that decide", None, case.follows)
+    yield Claim("the verdict follows from what is certified", None, case.follows)
     yield Claim("tables are numbers of single precision", None, case.single)
     yield Claim("the plan is that of the specification, and lasts", None, case.plan)
     yield Claim("f, B, E, h and the plan are smooth", None, case.smooth)
@@ -61,7 +61,7 @@ def of(certificate: Certificate, budget: int) -> Iterator[Claim]:
     outputs = [
         *(f"|{name} - {name}*| inside the tube" for name in spec.plant.states),
         *(f"what is added to {name}" for name in spec.plant.inputs),
-        *(f"memory {j + 1} of the controller" for j in range(proven.F.nrows())),
+        *(f"memory {j + 1} of the controller" for j in range(proven.tables["F"].nrows())),
     ]
     for f, name in enumerate(outputs):
         yield Claim(name, None, partial(case.output, f), ROWS)
@@ -89,7 +89,7 @@ class Case:
     def remainders(self) -> Remainders:
         """What is not linear."""
         own, recipe = self._proven, self._proven.recipe
-        return Remainders(self.course, (own.A, own.B, own.E), recipe.windows, slow=recipe.slow)
+        return Remainders(self.course, own.nominal, recipe.windows, slow=recipe.slow)
 
     @cached_property
     def widest(self) -> list[Fraction]:
@@ -106,7 +106,8 @@ class Case:
         """Of this loop."""
         machine, own, n = self._spec.hardware, self._proven, len(self._spec.plant.states)
         H = arb_mat(n, len(self.slow), [eta.column[i] for i in range(n) for eta in self.slow])
-        loop = Loop(own.A, own.B, H, own.F, own.G, own.M, own.N, machine.sample_time, machine.delay)
+        (A, B, _), (F, G, M, N) = own.nominal, own.tables.values()
+        loop = Loop(A, B, H, F, G, M, N, machine.sample_time, machine.delay)
         noise, phases = Size.of(machine.noise, n), []
         for begin, stage, acting in phases_of(own.stages, loop.waiting):
             W, Z, U = (list(map(exact, sizes_)) for sizes_ in (stage.half_widths, stage.memory, acting))
@@ -121,14 +122,15 @@ class Case:
 
     def _rounding(self, noise: Size, W: Sequence[Ball], Z: Sequence[Ball]) -> list[Ball]:
         """What dy (n), u (m) and zeta (z) are off by, (D.8)."""
-        own, tables, u = self.remainders, self._proven, _ROUNDING[self._spec.hardware.arithmetic]
+        own, tables, u = self.remainders, self._proven.tables, _ROUNDING[self._spec.hardware.arithmetic]
         c, lost = (len(Z) + len(W) + 3) * u, exact(_FLUSHED)
         measured = [
             (exact(PLAN) * x + exact(2 * u) * (2 * x + w + s)) * exact(_SECOND) + lost
             for x, w, s in zip(own.states_above, W, noise.each, strict=True)
         ]
         seen = [w + s + y for w, s, y in zip(W, noise.each, measured, strict=True)]
-        told = sizes(joined([[tables.M, tables.N], [tables.F, tables.G]])) * column([*Z, *seen])
+        rows = joined([[tables["M"], tables["N"]], [tables["F"], tables["G"]]])
+        told = sizes(rows) * column([*Z, *seen])
         planned = [*map(arb.__add__, own.inputs_above, own.held), *[arb(0)] * len(Z)]
         gamma = exact(c / (1 - c))
         return [*measured, *(gamma * (x + y) + lost for x, y in zip(planned, told.entries(), strict=True))]
@@ -147,18 +149,20 @@ class Case:
     def follows(self) -> Outcome:
         """Ranges of inputs are within their limits, and obstacles that decide are cleared."""
         spec, own = self._spec, self._proven
-        limits = [spec.limits.get(name) for name in spec.plant.inputs]
-        for given, (low, high) in zip(limits, own.ranges, strict=True):
-            if given is not None and not given[0] <= low <= high <= given[1]:
-                return stated(False, "an input is not within its limits")
+        limits = [
+            spec.limits.get(name, used) for name, used in zip(spec.plant.inputs, own.ranges, strict=True)
+        ]
+        if any(
+            low < least or most < high for (least, most), (low, high) in zip(limits, own.ranges, strict=True)
+        ):
+            return stated(False, "an input is not within its limits")
         decided = all(away or not it.decides for away, it in zip(own.cleared, spec.obstacles, strict=True))
         return stated(decided, "an obstacle that decides is not cleared")
 
     def single(self) -> Outcome:
         """Tables are numbers of single precision; where no controller is asked for it has no memory, and adds 0."""
-        own = self._proven
-        flat = [float(x) for table in (own.F, own.G, own.M, own.N) for x in table.entries()]
-        if self._spec.controller == "none" and (own.F.nrows() or any(flat)):
+        flat = [float(x) for table in self._proven.tables.values() for x in table.entries()]
+        if self._spec.controller == "none" and (self._proven.tables["F"].nrows() or any(flat)):
             return stated(False, "there is a controller, and none was asked for")
         return stated(all(single(x) == x for x in flat), "an entry is no number of single precision")
 
@@ -171,16 +175,13 @@ class Case:
 
     def smooth(self) -> Outcome:
         """What everything owes is kept on the safe set, and along the plan."""
-        spec, trajectory = self._spec, self._spec.trajectory
-        time = time_range(spec.uncertainty, self.course.horizon)
-        wind = () if spec.disturbance is None else spec.disturbance.duties
-        ranges: dict[str, Ends] = {**spec.plant.safe_set, **spec.plant.ranges}
-        if time is not None:
-            ranges[TIME] = time
-        duties = (*spec.plant.duties, *wind, *spec.uncertainty.duties)
-        found = [smooth(duties, ranges, self._budget)]
-        if isinstance(trajectory, Expressed):
-            found.append(smooth(trajectory.duties, {TIME: (Fraction(0), trajectory.horizon)}, self._budget))
+        spec, plan, budget = self._spec, self._spec.trajectory, self._budget
+        time, wind = time_range(spec.uncertainty, self.course.horizon), spec.disturbance
+        timed: dict[str, Ends] = {} if time is None else {TIME: time}
+        duties = (*spec.plant.duties, *spec.uncertainty.duties, *(wind.duties if wind else ()))
+        found = [smooth(duties, {**spec.plant.safe_set, **spec.plant.ranges, **timed}, budget)]
+        if isinstance(plan, Expressed):
+            found.append(smooth(plan.duties, {TIME: (Fraction(0), plan.horizon)}, budget))
         return together(found)
 
     def inside(self, i: int) -> Outcome:
@@ -200,7 +201,7 @@ class Case:
 
     def cleared(self, index: int) -> Outcome:
         """The tube keeps away from an obstacle."""
-        return cleared(self.course, self._spec.obstacles[index], self._proven.stages, self._budget)
+        return _cleared(self.course, self._spec.obstacles[index], self._proven.stages, self._budget)
 
     def met(self, name: str, wish: Fraction) -> Outcome:
         """A half-width that was asked for, of a state or an output, is kept by every stage."""
@@ -217,3 +218,53 @@ def _within(ends: Range, planned: Iterable[Ball], more: Ball) -> Outcome:
     if all(low <= x - more and x + more <= high for x in planned):
         return CONFIRMED
     return Outcome(verdict="undecided", why="it may leave it")
+
+
+# -- obstacles: rectangles about segments of the plan, halved where needed; exact
+
+
+def _cleared(course: Course, obstacle: Obstacle, stages: Sequence[Stage], budget: int) -> Outcome:
+    """No rectangle of a stage that may last at a segment meets the obstacle, and the plan starts outside of it."""
+    pair = [course.spec.plant.states.index(name) for name in obstacle.states]
+    start = course.curve.somewhere()
+    x, y = (somewhere(start[i]) for i in pair)
+    if obstacle.radius is None and contains(obstacle.corners, (x, y)):
+        return Outcome(verdict="undecided", why="the plan starts in the obstacle")
+
+    def clear(segment: Segment) -> bool:
+        widths, sides = _widths(course, segment, stages), [(i, *segment.x[i]) for i in pair]
+        return all(isfinite(low) and isfinite(high) for _, low, high in sides) and _apart(
+            obstacle, [(Fraction(low) - widths[i], Fraction(high) + widths[i]) for i, low, high in sides]
+        )
+
+    return along(course.curve.root, budget, clear)
+
+
+def _widths(course: Course, segment: Segment, stages: Sequence[Stage]) -> list[Fraction]:
+    """The widest stage that may last there: the plan's time is that of the loop, unless it repeats or is any."""
+    (begin, end), horizon, after = segment.when, course.spec.trajectory.horizon, course.spec.afterwards
+    if horizon is None or after == "repeat" or course.family is not None or not course.curve.moves:
+        begin, end = 0.0, inf
+    elif after == "rest" and end >= float(horizon) * (1 - 1e-9):
+        end = inf
+    starts = [own.start * course.spec.hardware.sample_time for own in stages]
+    met = stages[bisect_right(starts, max(0.0, begin)) - 1 : bisect_right(starts, end)]
+    return [max(own) for own in zip(*(own.half_widths for own in met), strict=True)]
+
+
+def _apart(obstacle: Obstacle, box: Sequence[Range]) -> bool:
+    if obstacle.center is not None and obstacle.radius is not None:
+        away = [
+            max(low - c, c - high, Fraction(0)) for c, (low, high) in zip(obstacle.center, box, strict=True)
+        ]
+        return away[0] ** 2 + away[1] ** 2 > obstacle.radius**2
+    corners = obstacle.corners
+    return all(_missed(a, b, box) for a, b in pairwise((*corners, corners[0])))
+
+
+def _missed(a: Point, b: Point, box: Sequence[Range]) -> bool:
+    """Whether an edge misses a rectangle: they are apart along an axis, or all corners are on one side of its line."""
+    if any(max(a[k], b[k]) < box[k][0] or min(a[k], b[k]) > box[k][1] for k in (0, 1)):
+        return True
+    sides = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) for x in box[0] for y in box[1]]
+    return min(sides) > 0 or max(sides) < 0

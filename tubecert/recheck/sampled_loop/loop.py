@@ -30,13 +30,14 @@ def column(entries: Sequence[Ball]) -> arb_mat:
 
 def joined(blocks: Sequence[Sequence[arb_mat]]) -> arb_mat:
     """A matrix of blocks: those of one row are equally high, those of one column equally wide."""
+    lines = [line for row in blocks for line in zip(*(block.tolist() for block in row), strict=True)]
     width = sum(block.ncols() for block in blocks[0])
-    flat: list[arb] = []
-    for row in blocks:
-        tables: list[list[list[arb]]] = [block.tolist() for block in row]
-        for lines in zip(*tables, strict=True):
-            flat += [x for line in lines for x in line]
-    return arb_mat(sum(row[0].nrows() for row in blocks), width, flat)
+    return arb_mat(len(lines), width, [x for line in lines for part in line for x in part])
+
+
+def stacked(parts: Sequence[arb_mat]) -> arb_mat:
+    """A matrix of all rows."""
+    return joined([[own] for own in parts])
 
 
 def parted(a: arb_mat, at: int) -> tuple[arb_mat, arb_mat]:
@@ -77,7 +78,7 @@ class Loop:
     @property
     def rest(self) -> Fraction:
         """tau': what is left of the delay."""
-        return self.delay - self.whole * self.sample
+        return self.delay % self.sample
 
     @property
     def waiting(self) -> int:
@@ -106,39 +107,32 @@ class Loop:
         e, zeta, *waiting, _, heard, rounded, _ = self.parts
         return [self.N * (e + heard) + self.M * zeta + rounded, *waiting]
 
-    @cached_property
-    def flows(self) -> list[arb_mat]:
-        """Rows of what changes e between samples, (n + r + m, ..): e itself, eta, the input that acts at first."""
-        return [self.parts[0], self.parts[-4], self.sent[-1]]
-
     def flow(self, t: Ball, order: int = 0) -> arb_mat:
-        """Its exponential, (n + r + m) square, or the derivative by t of an order, for every t of the ball.
+        """e^(S t) with S = [A H B; 0 0 0; 0 0 0], or its derivative of an order, for every t of the ball.
 
-        With P = e^(A t) and J its integral from 0 on, e^([A H B; 0 0 0; 0 0 0] t) = [P JH JB; 0 I 0; 0 0 I].
+        It moves (e, eta, a held input): with P = e^(A t) and J its integral, e^(S t) = [P JH JB; 0 I 0; 0 0 I].
         """
         rates = joined([[self.A, self.H, self.B]])
-        rates = joined([[rates], [arb_mat(rates.ncols() - rates.nrows(), rates.ncols())]])
+        rates = stacked([rates, arb_mat(rates.ncols() - rates.nrows(), rates.ncols())])
         found = (rates * t).exp()
         for _ in range(order):
             found = rates * found
         return found
 
     def error(self, s: Ball, order: int = 0, *, later: bool) -> arb_mat:
-        """Rows of e(t_k + s), (n, ..), but for what acts on it from t_k on, or their derivative by s of an order.
+        """Rows of e(t_k + s), (n, ..), but for what acts on it from t_k on; or their derivative of an order.
 
         `later`: s is not before tau'.
         """
-        n, m = self.A.nrows(), self.B.ncols()
-        found = self.flow(s, order) * joined([[own] for own in self.flows])
+        e, eta, before, now = self.parts[0], self.parts[-4], self.sent[-1], self.sent[self.whole]
+        found = self.flow(s, order) * stacked([e, eta, before])
         if later:
-            other = arb_mat(found.nrows() - m, found.ncols()), self.sent[self.whole] - self.sent[-1]
-            found += self.flow(s - exact(self.rest), order) * joined([[own] for own in other])
-        return picked(range(n), found.nrows()) * found
+            found += self.flow(s - exact(self.rest), order) * stacked([0 * e, 0 * eta, now - before])
+        return picked(range(e.nrows()), found.nrows()) * found
 
     @property
     def step(self) -> arb_mat:
         """Those of xi_(k+1), (width, ..): AA, and NN."""
         e, zeta, *_, eta, heard, _, rounded = self.parts
         kept = self.G * (e + heard) + self.F * zeta + rounded
-        moved = [self.error(exact(self.sample), later=True), kept, *self.sent[:-1], eta]
-        return joined([[own] for own in moved])
+        return stacked([self.error(exact(self.sample), later=True), kept, *self.sent[:-1], eta])

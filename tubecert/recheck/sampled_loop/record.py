@@ -8,10 +8,10 @@ certified only the specification and what repeats it are.
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import dataclass
-from itertools import pairwise
 
-from flint import arb, arb_mat
+from flint import arb_mat
 
 from tubecert.recheck.certificate import read_settings
 from tubecert.recheck.document import Members, Node, digest
@@ -21,11 +21,11 @@ from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.specified.trajectory import Planned, Tabled
 
 NOT_EXAMINED = ("notes", "run", "spec.file_hash")
-_PARTS = ("nominal", "controller", "tube", "recipe", "inputs")  # of a certified result
-_MOST_LAGS = 50_000
+_PARTS = ("planned", "nominal", "controller", "tube", "recipe", "inputs", "clearance", "lacks")
+_BETWEEN = {"lags": (1, 50_000), "pieces": (1, 64), "panels": (1, 64), "windows": (1, 4_096)}
 _MOST_START = 1_000_000  # samples before the last stage
-_MOST_STAGES = _MOST_MEMORY = _MOST_PARTS = 64
-_MOST_WINDOWS = 4_096
+_MOST_STAGES = _MOST_MEMORY = 64
+Repeated = dict[str, tuple[object, object]]  # by path what is stated a second time, and what it is
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,24 +55,15 @@ class Recipe:
     slow: bool
 
 
-Repeated = dict[str, tuple[object, object]]
-"""By path what is stated a second time, and what it is."""
-
-
 @dataclass(frozen=True, slots=True)
 class Proven:
-    """What a certified result rests on: A (n, n), B (n, m), E (n, k); tables F (z, z), G (z, n), M (m, z), N (m, n).
+    """What a certified result rests on: matrices A (n, n), B (n, m), E (n, k) and the `tables` of the controller.
 
-    `ranges`: what each input keeps to. `cleared`: from which obstacles the tube keeps away.
+    These are F (z, z), G (z, n), M (m, z), N (m, n). `ranges`: what each input keeps to. `cleared`: which obstacles.
     """
 
-    A: arb_mat
-    B: arb_mat
-    E: arb_mat
-    F: arb_mat
-    G: arb_mat
-    M: arb_mat
-    N: arb_mat
+    nominal: tuple[arb_mat, ...]
+    tables: dict[str, arb_mat]
     stages: tuple[Stage, ...]
     recipe: Recipe
     plan: Plan
@@ -98,11 +89,10 @@ def read_certificate(document: Node) -> Certificate:
     whole = document.closed("format", "hash", "result", "notes", "run")
     for key in ("notes", "run"):
         whole[key].mapping()
-    certified = whole["result"].mapping().get("verdict") == "certified"
-    optional = ("planned", "clearance") if certified else ("planned", "clearance", "lacks", *_PARTS)
-    own = whole["result"].closed(
-        "verdict", "spec", "claim", *(_PARTS if certified else ()), optional=optional
-    )
+    own = whole["result"].closed("verdict", "spec", "claim", optional=_PARTS)
+    certified = own["verdict"].word("certified", "refuted", "undecided") == "certified"
+    if certified and "lacks" in own:
+        raise own["lacks"].refused("is there, and yet the verdict is certified")
     source = own["spec"].closed("effective", "effective_hash", "file_hash", optional=("settings",))
     source["file_hash"].text()
     spec = read_sampled_specification(source["effective"])
@@ -117,7 +107,7 @@ def read_certificate(document: Node) -> Certificate:
         "claim.hold": (claim["hold"].text(), spec.hardware.hold),
     }
     return Certificate(
-        verdict=own["verdict"].word("certified", "refuted", "undecided"),
+        verdict=own["verdict"].text(),
         specification=spec,
         proven=_proven(own, spec) if certified else None,
         repeated=repeated,
@@ -127,38 +117,36 @@ def read_certificate(document: Node) -> Certificate:
 
 
 def _proven(own: Members, spec: SampledSpecification) -> Proven:
-    states, inputs = spec.plant.states, spec.plant.inputs
-    n, m, k = len(states), len(inputs), 0 if spec.disturbance is None else len(spec.disturbance.E[0])
-    nominal, tables = own["nominal"].closed("A", "B", "E"), own["controller"].closed("F", "G", "M", "N")
-    z = _between(tables["F"].closed("columns", "rows")["columns"], 0, _MOST_MEMORY)
+    n, m, wind = len(spec.plant.states), len(spec.plant.inputs), spec.disturbance
+    k = 0 if wind is None else len(wind.E[0])
+    memory = own["controller"].closed("F", "G", "M", "N")["F"].closed("columns", "rows")
+    z = _between(memory["columns"], 0, _MOST_MEMORY)
     uses = [item.closed("input", "range", optional=("limits",)) for item in own["inputs"].sized(m)]
-    told = [(use["input"].text(), use.get("limits", _ends)) for use in uses]
-    kept = own.get("clearance", lambda item: item.sized(len(spec.obstacles))) or []
-    away = [item.closed("index", "verdict") for item in kept]
+    limits = [(use["input"].text(), use.get("limits", _ends)) for use in uses]
+    cleared = own.get("clearance", lambda item: item.sized(len(spec.obstacles))) or []
+    away = [item.closed("index", "verdict") for item in cleared]
     return Proven(
-        A=_matrix(nominal["A"], n, n),
-        B=_matrix(nominal["B"], n, m),
-        E=_matrix(nominal["E"], n, k),
-        F=_matrix(tables["F"], z, z),
-        G=_matrix(tables["G"], z, n),
-        M=_matrix(tables["M"], m, z),
-        N=_matrix(tables["N"], m, n),
+        nominal=tuple(_matrices(own["nominal"], A=(n, n), B=(n, m), E=(n, k)).values()),
+        tables=_matrices(own["controller"], F=(z, z), G=(z, n), M=(m, z), N=(m, n)),
         stages=_stages(own["tube"], spec, z),
         recipe=_recipe(own["recipe"], n + m + z),
         plan=_plan(own, spec),
         ranges=tuple(_ends(use["range"]) for use in uses),
         cleared=tuple(item["verdict"].word("certified", "undecided") == "certified" for item in away),
         repeated={
-            "inputs": (told, [(name, spec.limits.get(name)) for name in inputs]),
+            "inputs": (limits, [(name, spec.limits.get(name)) for name in spec.plant.inputs]),
             "clearance": ([item["index"].count() for item in away], list(range(len(spec.obstacles)))),
         },
     )
 
 
-def _matrix(node: Node, p: int, q: int) -> arb_mat:
-    own = node.closed("columns", "rows")
-    _between(own["columns"], q, q)
-    return arb_mat(p, q, [arb(_float(entry)) for row in own["rows"].rows(p, q) for entry in row])
+def _matrices(node: Node, **shapes: tuple[int, int]) -> dict[str, arb_mat]:
+    own, found = node.closed(*shapes), {}
+    for name, (p, q) in shapes.items():
+        matrix = own[name].closed("columns", "rows")
+        _between(matrix["columns"], q, q)
+        found[name] = arb_mat(p, q, [_float(entry) for row in matrix["rows"].rows(p, q) for entry in row])
+    return found
 
 
 def _float(node: Node) -> float:
@@ -175,40 +163,30 @@ def _float(node: Node) -> float:
 def _stages(node: Node, spec: SampledSpecification, z: int) -> tuple[Stage, ...]:
     found = tuple(_stage(item, spec, z) for item in node.entries()[: _MOST_STAGES + 1])
     starts = [own.start for own in found]
-    if not 0 < len(found) <= _MOST_STAGES or starts[0] != 0 or starts[-1] > _MOST_START:
-        raise node.refused(f"must have 1 to {_MOST_STAGES} stages, the first from sample 0 on")
-    if any(a >= b for a, b in pairwise(starts)):
-        raise node.refused("has stages that are not in order")
+    ordered = starts == sorted(set(starts)) and starts[:1] == [0] and starts[-1] <= _MOST_START
+    if not ordered or len(found) > _MOST_STAGES:
+        raise node.refused(f"must have 1 to {_MOST_STAGES} stages in their order, the first from sample 0 on")
     return found
 
 
 def _stage(node: Node, spec: SampledSpecification, z: int) -> Stage:
     own = node.closed("start", "half_widths", "deviations", "memory")
-    widths = own["half_widths"].closed(*spec.plant.states)
-    deviations = own["deviations"].closed(*spec.plant.inputs)
-    found = Stage(
-        own["start"].count(),
-        tuple(widths[name].decimal() for name in spec.plant.states),
-        tuple(deviations[name].decimal() for name in spec.plant.inputs),
-        tuple(item.decimal() for item in own["memory"].sized(z)),
+    widths, deviations = (
+        tuple(own[key].closed(*names)[name].decimal() for name in names)
+        for key, names in (("half_widths", spec.plant.states), ("deviations", spec.plant.inputs))
     )
-    if min(found.half_widths) <= 0 or min(found.boxes) < 0:
+    memory = tuple(item.decimal() for item in own["memory"].sized(z))
+    if min(widths) <= 0 or min((*deviations, *memory)) < 0:
         raise node.refused("has a box without an inside")
-    return found
+    return Stage(own["start"].count(), widths, deviations, memory)
 
 
 def _recipe(node: Node, outputs: int) -> Recipe:
-    own = node.closed("lags", "cuts", "pieces", "panels", "windows", "parameters")
-    lags = _between(own["lags"], 1, _MOST_LAGS)
+    own = node.closed("cuts", "parameters", *_BETWEEN)
+    counts = {key: _between(own[key], *ends) for key, ends in _BETWEEN.items()}
     rows = [row.entries() for row in own["cuts"].sized(outputs)]
-    return Recipe(
-        lags=lags,
-        cuts=tuple(tuple(_between(item, 0, lags) for item in row) for row in rows),
-        pieces=_between(own["pieces"], 1, _MOST_PARTS),
-        panels=_between(own["panels"], 1, _MOST_PARTS),
-        windows=_between(own["windows"], 1, _MOST_WINDOWS),
-        slow=own["parameters"].word("slow", "sudden") == "slow",
-    )
+    cuts = tuple(tuple(_between(lag, 0, counts["lags"]) for lag in row) for row in rows)
+    return Recipe(**counts, cuts=cuts, slow=own["parameters"].word("slow", "sudden") == "slow")
 
 
 def _between(node: Node, least: int, most: int) -> int:
@@ -232,3 +210,8 @@ def _plan(own: Members, spec: SampledSpecification) -> Plan:
 def _ends(node: Node) -> Range:
     low, high = node.pair()
     return low.decimal(), high.decimal()
+
+
+def single(value: float) -> float:
+    """The number of single precision next to one."""
+    return float(struct.unpack("f", struct.pack("f", value))[0])

@@ -64,9 +64,7 @@ class Remainders:
     (m), with what a computer misses u* by. Raises `ValueError` where parameters are `slow`, and u* jumps.
     """
 
-    def __init__(
-        self, course: Course, nominal: tuple[arb_mat, arb_mat, arb_mat], windows: int, *, slow: bool
-    ) -> None:
+    def __init__(self, course: Course, nominal: Sequence[arb_mat], windows: int, *, slow: bool) -> None:
         self._course, self._spec, self._slow = course, course.spec, slow
         self._A, self._B, self._E = nominal
         self._n, self._m = self._B.nrows(), self._B.ncols()

@@ -23,7 +23,16 @@ from tubecert.recheck.balls import Ball, between, exact
 from tubecert.recheck.clock import time_is_up, told
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import CONFIRMED
-from tubecert.recheck.sampled_loop.loop import Loop, around_zero, column, joined, parted, picked, sizes
+from tubecert.recheck.sampled_loop.loop import (
+    Loop,
+    around_zero,
+    column,
+    joined,
+    parted,
+    picked,
+    sizes,
+    stacked,
+)
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.remainders import Size, Slow
 
@@ -179,9 +188,9 @@ class Inequalities:
 
     def _gamma(self, age: Ball, order: int = 0) -> arb_mat:
         """What they do to xi in that time, (width, signals), or its derivative of an order."""
-        e, eta, _ = (parted(own, self.loop.width)[0].transpose() for own in self.loop.flows)
-        into = joined([[e, eta, arb_mat(self.loop.width, self.loop.B.ncols())]])
-        return into * (self.loop.flow(age, order) * self._entries)
+        e, *_, eta, _, held, _ = self.loop.parts
+        moved, _ = parted(stacked([e, eta, held]), self.loop.width)
+        return moved.transpose() * (self.loop.flow(age, order) * self._entries)
 
     def _kernels(self, until: Fraction) -> list[arb_mat]:
         """Through these rows have int_0^until |r gamma| at most: |g| <= chord + (d^3/12 a panel) sup|g''|."""
@@ -231,69 +240,56 @@ class Inequalities:
 
         Raises `ArithmeticError` if these are too many, or the time is up.
         """
-        lags, outputs = min(self.recipe.lags, self.last), len(self.recipe.cuts)
-        outputs += (len(self.nodes) - 1) * len(self.error)
-        if outputs * len(self.phases) * lags > _MOST_TERMS:
-            raise ArithmeticError("there are too many rows, phases and lags")
+        lags, last, count = min(self.recipe.lags, self.last), self.last, len(self.phases)
         terms, started = [], []
         for q, found in self._lags(lags):
             terms.append([[x.abs_upper() for x in row] for row in found.tolist()])
             started.append(sizes(self._begun.of(q)).entries())
-        late = self._boxes.of(q).tolist()
-        ends = [*(own.start for own in self.phases), self.last + 1]
+        late, later = self._boxes.of(q).tolist(), [self.phase(k) for k in range(1, last + 1 - lags)]
+        ends = [*(own.start for own in self.phases), last + 1]
         spans = [  # by sample: which lags, from one to another, are of samples of which phase
-            [
-                (p, max(0, k + 1 - end), min(lags, k - begin) + 1)
-                for p, (begin, end) in enumerate(pairwise(ends))
-                if begin <= k < end + lags
-            ]
-            for k in range(self.last + 1)
+            [(p, max(0, k + 1 - ends[p + 1]), min(lags, k - ends[p]) + 1) for p in range(count)]
+            for k in range(last + 1)
         ]
-        earlier, carried = [self.phase(k) for k in range(1, self.last + 1 - lags)], []
-        for f in range(outputs):
-            by_phase = zip(*(lag[f] for lag in terms), strict=True)
-            sums = [list(accumulate(own, initial=arb(0))) for own in by_phase]
+        spans = [[(p, low, high) for p, low, high in own if low < high] for own in spans]
+        carried = []
+        for f in range(q.nrows()):
+            sums = [list(accumulate((own[f][p] for own in terms), initial=arb(0))) for p in range(count)]
             gathered = (sum((sums[p][b] - sums[p][a] for p, a, b in own), start=arb(0)) for own in spans)
-            rest = chain((own[f] for own in started), (late[f][p].abs_upper() for p in earlier))
+            rest = chain((own[f] for own in started), (late[f][p].abs_upper() for p in later))
             carried.append([x + y for x, y in zip(gathered, rest, strict=True)])
         return carried
 
     def _lags(self, lags: int) -> Iterator[tuple[arb_mat, arb_mat]]:
         """At every lag the enclosed rows q; what acts at its sample, and from there to the one after: (p, phases)."""
         loop, n, r = self.loop, len(self.error), len(self.slow)
-        eta = loop.width - r  # where it begins in xi
         with ctx.workprec(_SETUP_BITS):
             nodes = [loop.error(exact(s), later=s >= loop.rest) for s in self.nodes]
-            q, heard = parted(joined([[own] for own in (*nodes, loop.sent[0], loop.parts[1])]), loop.width)
+            q, heard = parted(stacked([*nodes, loop.sent[0], loop.parts[1]]), loop.width)
             step, arriving = parted(loop.step, loop.width)
             acting = [self._within(self._kernels(s)) for s in self.nodes]
-            acting.append(arb_mat(q.nrows() - n * len(nodes), len(self.phases)))
-            found, kernels = joined([[own] for own in acting]), self._kernels(loop.sample)
-        found += self._heard.of(heard)
+            found = stacked([*acting, arb_mat(q.nrows() - n * len(nodes), len(self.phases))])
+            found, kernels = found + self._heard.of(heard), self._kernels(loop.sample)
+        if q.nrows() * len(self.phases) * lags > _MOST_TERMS:
+            raise ArithmeticError("there are too many rows, phases and lags")
         each = enumerate(self.recipe.cuts[:n] * len(nodes) + self.recipe.cuts[n:])
         cuts = {(f, c): lag for f, row in each for c, lag in zip(range(r), row, strict=True)}
-        off = set(cuts)  # up to its cut a signal counts by its rate, then by its size
+        off, eta = set(cuts), loop.width - r  # up to its cut a signal counts by its rate, then by its size
         owed: dict[tuple[int, int], Ball] = {}
         for lag in range(lags + 1):
-            _tell(lag, lags)
+            if lag % _TELLS == 0 and time_is_up():
+                raise ArithmeticError("the time was up")
+            if lag % _TELLS == 0 and (tell := told()) is not None:
+                tell(lag, lag / (lags + 1))
             rows = q.mid()
             missed = q - rows
             for place, entry in owed.items():
                 missed[place] = entry
             yield q, found + self._boxes.of(missed)
-            owed = {}
-            for f, c in (place for place, at in cuts.items() if at == lag):
-                owed[f, eta + c], rows[f, eta + c] = rows[f, eta + c], 0
-                off ^= {(f, c), (f, r + c)}
+            owed = {(f, eta + c): rows[f, eta + c] for (f, c), at in cuts.items() if at == lag}
+            for f, c in owed:
+                rows[f, c] = 0
+                off ^= {(f, c - eta), (f, c - eta + r)}
             found, q = self._through(rows, kernels, off) + self._heard.of(rows * arriving), rows * step
             for f, c in (place for place, at in cuts.items() if at <= lag):
                 q[f, eta + c] = 0
-
-
-def _tell(lag: int, lags: int) -> None:
-    """Raises `ArithmeticError` if the time is up."""
-    if lag % _TELLS == 0:
-        if time_is_up():
-            raise ArithmeticError("the time was up")
-        if (tell := told()) is not None:
-            tell(lag, lag / (lags + 1))
