@@ -235,9 +235,10 @@ def test_a_start_is_followed_until_it_is_forgotten():
 
 
 def test_commands_on_their_way_are_those_of_their_own_stage():
-    """x' = -x + u, Ts = tau = 1, delta = -e, e(0) = -1: what is sent at 0 acts in the second sample, |e(2)| = .497."""
-    late = rest([[-1.0]], [[1.0]], delay=Fraction(1), kind="point", start=(-1.0,))
-    assert not plain(late, [[-1.0]], (stage(0, ["1.01"], ["1.01"]), stage(1, ["0.37"], ["0.37"])))
+    """x' = -x + u, Ts = 1, two late, delta = -.875 e, e(0) = -1: what is sent at 0 acts from 2 on, |e(3)| = .503."""
+    late = rest([[-1.0]], [[1.0]], delay=Fraction(2), kind="point", start=(-1.0,))
+    assert not plain(late, [[-0.875]], (stage(0, ["1.1"], ["0.88"]), stage(1, ["0.38"], ["0.35"])))
+    late = replace(late, delay=Fraction(1))
     assert plain(late, [[-0.25]], (stage(0, ["1.02"], ["0.31"]), stage(1, ["0.6"], ["0.2"])), 6)
 
 

@@ -182,8 +182,8 @@ def test_what_is_left_of_the_past_is_not_forgotten():
 
 @pytest.mark.slow
 def test_commands_on_their_way_are_those_of_their_own_stage():
-    """x' = -x + u, Ts = tau = 1, delta = -e, e(0) = -1: what is sent at 0 acts in the second sample, |e(2)| = .497."""
-    assert why_not(by_hand("-1*x", [(0, 1.01, 1.01), (1, 0.37, 0.37)], -1.0, start="-1", delay="1"))
+    """x' = -x + u, Ts = 1, two late, delta = -.875 e, e(0) = -1: what is sent at 0 acts from 2 on, |e(3)| = .503."""
+    assert why_not(by_hand("-1*x", [(0, 1.1, 0.88), (1, 0.38, 0.35)], -0.875, start="-1", delay="2"))
     assert (
         why_not(by_hand("-1*x", [(0, 1.02, 0.31), (1, 0.6, 0.2)], -0.25, start="-1", delay="1", lags=6)) == []
     )
