@@ -19,7 +19,6 @@ DECIDING: Final = (
     "cvxpy",
     "pyyaml",
     "python-flint",
-    "llvmlite",
 )
 RUNNING: Final = ("distributed",)  # decides who computes, never what
 SHOWING: Final = ("typer", "rich", "jinja2", "matplotlib")
