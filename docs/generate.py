@@ -1,4 +1,4 @@
-"""Writes docs/reference/ and the README's table of published metrics: python docs/generate.py
+"""Writes docs/reference/: python docs/generate.py
 
 From the JSON Schemas, the pages of `explain` and what `verify` said of the published metrics.
 """
@@ -166,6 +166,7 @@ def published() -> str:
         "```console\ntubecert verify configs/published/*.yaml --json > configs/published/verified.json\n```",
         "The command takes a few minutes; `tubecert verify configs/published/*.yaml --expect` compares with what the "
         "files lock.",
+        "\n".join(_by_source(folder, known)),
         "| metric | published | proven | supports, 1/s | condition number | refuted at |\n|---|---|---|---|---|---|\n"
         + "\n".join(_published_row(folder, each) for each in known),
         *_beside(folder, known),
@@ -259,25 +260,17 @@ def _sources(folder: Path, known: list[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(re.sub(r"cached metric \d+", "cached metrics (ged_..)", text) for text in told))
 
 
-def readme(text: str) -> str:
-    """The text of README.md with its table of published metrics: the page above, counted by source."""
-    folder = ROOT / "configs" / "published"
-    known = json.loads((folder / "verified.json").read_text(encoding="utf-8"))
+def _by_source(folder: Path, known: list[dict[str, Any]]) -> list[str]:
+    """How many metrics of each source hold."""
     groups: dict[str, list[dict[str, Any]]] = {}
     for each in known:
         source = _notes(folder / Path(each["file"]).name)["source"]
         groups.setdefault(re.split(r",| \(", source)[0], []).append(each)
-    rows = [
-        "| source | metrics | hold | refuted |",
-        "|---|---|---|---|",
-        *(_readme_row(source, groups[source]) for source in sorted(groups)),
-    ]
-    begin, end = (f"<!-- {word} of the table that docs/generate.py writes -->\n" for word in ("start", "end"))
-    before, rest = text.split(begin)
-    return before + begin + "\n" + "\n".join(rows) + "\n\n" + end + rest.split(end)[1]
+    rows = (_of_source(source, groups[source]) for source in sorted(groups))
+    return ["| source | metrics | hold | refuted |", "|---|---|---|---|", *rows]
 
 
-def _readme_row(source: str, group: list[dict[str, Any]]) -> str:
+def _of_source(source: str, group: list[dict[str, Any]]) -> str:
     failed = [_FAILS[each["reason"]["claim"]] for each in group if each["verdict"] != "certified"]
     counts = (f"{failed.count(claim)} {claim}" for claim in sorted(set(failed)))
     told = f"{len(failed)} ({', '.join(counts)})" if failed else "0"
@@ -390,8 +383,6 @@ def main() -> None:
     (ROOT / "tubecert" / "schemas" / "sampled-loop.schema.json").write_text(text, encoding="utf-8")
     for name, text in everything().items():
         (REFERENCE / name).write_text(text, encoding="utf-8")
-    page = ROOT / "README.md"
-    page.write_text(readme(page.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -108,7 +108,7 @@ def test_numbered_equations_are_defined_once_and_exist():
 
 
 def test_the_readme_is_read_once():
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 2000
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 1300
 
 
 def test_errata_mentioned_elsewhere_exist():
