@@ -165,12 +165,12 @@ def test_sweep_keeps_one_for_every_point():
 def test_a_swept_rate_is_drawn(monkeypatch):
     """A tube that is narrower at a higher rate: half-widths of both states in one figure, now and in the long run."""
 
-    def certify(spec, *, settings, **_):
+    def certify(spec):
         text = spec.source.replace("rate: 500", f"rate: {1 / spec.hardware.sample_time}")
         scale, (own, *_) = spec.hardware.sample_time * 500, sampled.certificate().result.tube
         widths = {name: scale * width for name, width in own.half_widths.items()}
         stages = replace(own, half_widths=widths), replace(own, start=9, half_widths=widths)
-        return sampled.certificate(text, settings, tube=stages)
+        return sampled.certificate(text, dict(spec.settings), tube=stages)
 
     monkeypatch.setattr(certification, "certify", certify)
     run("sweep", "cart.yaml", "--over", "hardware.rate=200:500:4", "-o", "s")
