@@ -10,16 +10,15 @@ from fractions import Fraction
 from typing import Final
 
 from tubecert.certificate.effective import Effective
-from tubecert.digits import down, near, short, up
+from tubecert.digits import near, short, up
 from tubecert.report.claimed import NOT_RECHECKED, started
 from tubecert.report.figures_sampled import figures, period
 from tubecert.report.page import Block, Cell, Facts, Figures, Items, Listing, Page, Section, Table, Tile
 from tubecert.report.page_origin import check_again, system
 from tubecert.report.page_simulation import Simulated, simulated_blocks
-from tubecert.sampled_loop.record import Certificate, InputUse, Notes, Result
+from tubecert.sampled_loop.record import Certificate, Notes, Result
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import (
-    NOTHING,
     assumed,
     delay,
     extent,
@@ -31,6 +30,7 @@ from tubecert.words.sampled_loop import (
     promise,
     remedy,
     size,
+    span,
 )
 
 _MOST, _ROWS = 6, 4  # states of the first screen; where there are more than four, they stand side by side
@@ -146,20 +146,11 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
 def _inputs(result: Result) -> Iterator[tuple[str, str]]:
     units = result.spec.effective.system.units
     for use in result.inputs:
-        told = f"{_range(use)} {units.get(use.input, '')}".rstrip()
+        told = f"{span(*use.range)} {units.get(use.input, '')}".rstrip()
         if use.limits is not None and use.share is not None:
             limits, used = " to ".join(map(near, use.limits)), up(100 * use.share, 3)
             told += f" of {limits}: {used} % of the room"
         yield use.input, told
-
-
-def _range(use: InputUse) -> str:
-    """Its ends, rounded outward; of an input to which nothing but rounding is added, as they are."""
-    outward, plain = (down(use.range[0]), up(use.range[1])), [short(round(at, 12)) for at in use.range]
-    missed = max(abs(Fraction(text) - at) for text, at in zip(plain, use.range, strict=True))
-    if missed == 0 or missed > NOTHING:
-        return " to ".join(outward)
-    return f"{' to '.join(dict.fromkeys(plain))}, within {short(NOTHING)}"
 
 
 def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:

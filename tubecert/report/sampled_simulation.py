@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from tubecert.digits import down, short, up
+from tubecert.digits import short, up
 from tubecert.report.layout import indented, kept_in, plain_table
 from tubecert.report.simulation import CAVEAT, STYLES
+from tubecert.words.sampled_loop import span
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -79,7 +80,7 @@ def _shares(own: Campaign) -> Table:
 
 def _ranges(own: Campaign) -> Iterator[str]:
     for name, went in own.went.items():
-        proven = went.proven and f", proven to stay in [{down(went.proven[0])}, {up(went.proven[1])}]"
+        proven = went.proven and f", proven: {span(*went.proven)}"
         yield f"{name} went from {short(went.least)} to {short(went.greatest)}{proven or ''}"
     for i, passed in enumerate(own.passed, 1):
         yield f"obstacle {i}: {short(passed.distance)} away at least"

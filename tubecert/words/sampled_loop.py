@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import Final
 
 from tubecert.certificate.effective import Effective, Tree
-from tubecert.digits import end, in_unit, short, up
+from tubecert.digits import down, end, in_unit, short, up
 from tubecert.sampled_loop.record import Lack, Missing, Notes, Result, Shares
 from tubecert.verdict import Verdict
 
@@ -125,6 +125,15 @@ def is_alone(effective: Effective) -> bool:
 def size(bound: Fraction) -> str:
     """A half-width or a deviation, rounded up; what is as good as nothing is said in one way."""
     return f"< {short(NOTHING)}" if 0 < bound < NOTHING else up(bound)
+
+
+def span(low: Fraction | float, high: Fraction | float) -> str:
+    """Ends of a range, rounded outward; where nothing but rounding is added, as they are."""
+    outward, plain = (down(low), up(high)), (short(round(low, 12)), short(round(high, 12)))
+    missed = max(abs(float(Fraction(plain[0]) - low)), abs(float(Fraction(plain[1]) - high)))
+    if missed == 0 or missed > NOTHING:
+        return " to ".join(outward)
+    return f"{' to '.join(dict.fromkeys(plain))}, within {short(NOTHING)}"
 
 
 def percents(shares: Shares) -> dict[str, int]:
