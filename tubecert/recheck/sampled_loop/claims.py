@@ -22,7 +22,7 @@ from tubecert.recheck.obstacles import Obstacle, Point
 from tubecert.recheck.planned import serves
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.sampled_loop.loop import Loop, column, joined, sizes
-from tubecert.recheck.sampled_loop.record import Certificate, Proven, Stage, single
+from tubecert.recheck.sampled_loop.record import Certificate, Proven, single
 from tubecert.recheck.sampled_loop.remainders import PLAN, Remainders, Size, Slow
 from tubecert.recheck.sampled_loop.theorem import Inequalities, Phase, phases_of
 from tubecert.recheck.sampled_loop.windows import Course, course_of
@@ -149,12 +149,8 @@ class Case:
     def follows(self) -> Outcome:
         """Ranges of inputs are within their limits, and obstacles that decide are cleared."""
         spec, own = self._spec, self._proven
-        limits = [
-            spec.limits.get(name, used) for name, used in zip(spec.plant.inputs, own.ranges, strict=True)
-        ]
-        if any(
-            low < least or most < high for (least, most), (low, high) in zip(limits, own.ranges, strict=True)
-        ):
+        used = dict(zip(spec.plant.inputs, own.ranges, strict=True))
+        if any(used[name][0] < low or high < used[name][1] for name, (low, high) in spec.limits.items()):
             return stated(False, "an input is not within its limits")
         decided = all(away or not it.decides for away, it in zip(own.cleared, spec.obstacles, strict=True))
         return stated(decided, "an obstacle that decides is not cleared")
@@ -199,10 +195,6 @@ class Case:
         more += exact(PLAN) * self.remainders.inputs_above[j]
         return _within(self._proven.ranges[j], (own.u[j] for own in self.remainders.windows), more)
 
-    def cleared(self, index: int) -> Outcome:
-        """The tube keeps away from an obstacle."""
-        return _cleared(self.course, self._spec.obstacles[index], self._proven.stages, self._budget)
-
     def met(self, name: str, wish: Fraction) -> Outcome:
         """A half-width that was asked for, of a state or an output, is kept by every stage."""
         row = self._spec.plant.lengths[name]
@@ -212,44 +204,41 @@ class Case:
         ]
         return stated(max(widths) <= wish, "it is wider")
 
+    # -- obstacles: rectangles about segments of the plan, halved where needed; exact
+
+    def cleared(self, index: int) -> Outcome:
+        """No rectangle of a stage that may last at a segment meets an obstacle, and the plan starts outside of it."""
+        obstacle, start = self._spec.obstacles[index], self.course.curve.somewhere()
+        pair = [self._spec.plant.states.index(name) for name in obstacle.states]
+        x, y = (somewhere(start[i]) for i in pair)
+        if obstacle.radius is None and contains(obstacle.corners, (x, y)):
+            return Outcome(verdict="undecided", why="the plan starts in the obstacle")
+
+        def clear(segment: Segment) -> bool:
+            widths, sides = self._widths(*segment.when), [(i, *segment.x[i]) for i in pair]
+            return all(isfinite(low) and isfinite(high) for _, low, high in sides) and _apart(
+                obstacle, [(Fraction(low) - widths[i], Fraction(high) + widths[i]) for i, low, high in sides]
+            )
+
+        return along(self.course.curve.root, self._budget, clear)
+
+    def _widths(self, begin: float, end: float) -> list[Fraction]:
+        """The widest stage that may last then: the plan's time is that of the loop, unless it repeats or is any."""
+        horizon, after, course = self._spec.trajectory.horizon, self._spec.afterwards, self.course
+        if horizon is None or after == "repeat" or course.family is not None or not course.curve.moves:
+            return self.widest
+        if after == "rest" and end >= float(horizon) * (1 - 1e-9):
+            end = inf
+        starts = [own.start * self._spec.hardware.sample_time for own in self._proven.stages]
+        met = self._proven.stages[bisect_right(starts, max(0.0, begin)) - 1 : bisect_right(starts, end)]
+        return [max(own) for own in zip(*(own.half_widths for own in met), strict=True)]
+
 
 def _within(ends: Range, planned: Iterable[Ball], more: Ball) -> Outcome:
     low, high = map(exact, ends)
     if all(low <= x - more and x + more <= high for x in planned):
         return CONFIRMED
     return Outcome(verdict="undecided", why="it may leave it")
-
-
-# -- obstacles: rectangles about segments of the plan, halved where needed; exact
-
-
-def _cleared(course: Course, obstacle: Obstacle, stages: Sequence[Stage], budget: int) -> Outcome:
-    """No rectangle of a stage that may last at a segment meets the obstacle, and the plan starts outside of it."""
-    pair = [course.spec.plant.states.index(name) for name in obstacle.states]
-    start = course.curve.somewhere()
-    x, y = (somewhere(start[i]) for i in pair)
-    if obstacle.radius is None and contains(obstacle.corners, (x, y)):
-        return Outcome(verdict="undecided", why="the plan starts in the obstacle")
-
-    def clear(segment: Segment) -> bool:
-        widths, sides = _widths(course, segment, stages), [(i, *segment.x[i]) for i in pair]
-        return all(isfinite(low) and isfinite(high) for _, low, high in sides) and _apart(
-            obstacle, [(Fraction(low) - widths[i], Fraction(high) + widths[i]) for i, low, high in sides]
-        )
-
-    return along(course.curve.root, budget, clear)
-
-
-def _widths(course: Course, segment: Segment, stages: Sequence[Stage]) -> list[Fraction]:
-    """The widest stage that may last there: the plan's time is that of the loop, unless it repeats or is any."""
-    (begin, end), horizon, after = segment.when, course.spec.trajectory.horizon, course.spec.afterwards
-    if horizon is None or after == "repeat" or course.family is not None or not course.curve.moves:
-        begin, end = 0.0, inf
-    elif after == "rest" and end >= float(horizon) * (1 - 1e-9):
-        end = inf
-    starts = [own.start * course.spec.hardware.sample_time for own in stages]
-    met = stages[bisect_right(starts, max(0.0, begin)) - 1 : bisect_right(starts, end)]
-    return [max(own) for own in zip(*(own.half_widths for own in met), strict=True)]
 
 
 def _apart(obstacle: Obstacle, box: Sequence[Range]) -> bool:

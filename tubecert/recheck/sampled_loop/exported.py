@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ast
 import math
-import operator
 import re
 import stat
 from bisect import bisect_right
@@ -45,22 +44,18 @@ _EVER: Final = 2**30  # samples of a formula,
 _EVERY: Final = 4096  # ... of them one for the self-test,
 _LOOKED_AT: Final = (*range(256), *(2**j - 1 for j in range(9, 31)))  # ... and of them here
 _SIGNS: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-_APPLIED: Final = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+_APPLIED: Final = {"+": arb.__add__, "-": arb.__sub__, "*": arb.__mul__, "/": arb.__truediv__}
 Rows = list[list[float]]
 
 
 def exported(document: Node, folder: str) -> list[tuple[str, Outcome]]:
     """The claims of a folder of exported code; one that cannot be read contradicts the only one."""
-    try:
-        files = {path.name: _content(path) for path in sorted(Path(folder).iterdir())}
+    try:  # no link is followed, and no pipe opened
+        found = [(path, stat.S_ISREG(path.lstat().st_mode)) for path in sorted(Path(folder).iterdir())]
+        files = {path.name: path.read_bytes() if regular else b"" for path, regular in found}
     except (OSError, ValueError) as error:
         return [("controller: the folder can be read", stated(False, str(error)))]
     return list(compared(document, files))
-
-
-def _content(path: Path) -> bytes:
-    """Of a regular file; no link is followed, and no pipe opened."""
-    return path.read_bytes() if stat.S_ISREG(path.lstat().st_mode) else b""
 
 
 def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, Outcome]]:

@@ -78,23 +78,17 @@ class Remainders:
         self._strange = {i: e for i, e in strange if not names([e]).isdisjoint(plant.ranges)}  # 0 at p0
         if slow and self._strange and not course.smooth:
             raise ValueError("u* jumps, so that parameters are not slow")
-        timed = (*plant.states, TIME)
-        self._h, self._slopes_of_h = (
-            Program(own, timed) for own in (h.h or (), _gradients(h.h or (), timed))
-        )
+        own, timed = h.h or (), (*plant.states, TIME)
+        self._h, self._slopes_of_h = Program(own, timed), Program(_gradients(own, timed), timed)
         self._sudden = h.h is None and not {"h_x", "h_t"} <= h.declared.keys()
-        own = [] if self._sudden else range(self._m)
-        self._matched = [j for j in own if h.h is None or h.h[j] is not NOUGHT]
+        matched = [] if self._sudden else range(self._m)
+        self._matched = [j for j in matched if h.h is None or h.h[j] is not NOUGHT]
         self._gusts = Size([], length=False) if wind is None else Size.of(wind.bound, self._E.ncols())
-        self.windows = course.windows(windows)
+        self.windows, self._defect = course.windows(windows), course.defect()
         self.states_above = tops(own.x for own in self.windows)
         self.inputs_above = tops(own.u for own in self.windows)
         jumps = zip(course.held(self.windows), self.inputs_above, strict=True)
         self.held = [x + exact(PLAN) * above for x, above in jumps]
-
-    @cached_property
-    def _defect(self) -> list[Ball]:
-        return self._course.defect()
 
     # -- signals
 

@@ -23,16 +23,7 @@ from tubecert.recheck.balls import Ball, between, exact
 from tubecert.recheck.clock import time_is_up, told
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.metric import CONFIRMED
-from tubecert.recheck.sampled_loop.loop import (
-    Loop,
-    around_zero,
-    column,
-    joined,
-    parted,
-    picked,
-    sizes,
-    stacked,
-)
+from tubecert.recheck.sampled_loop.loop import Loop, around_zero, joined, parted, picked, sizes, stacked
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.remainders import Size, Slow
 
@@ -80,7 +71,7 @@ class Amplitudes:
         """What they do through rows (p, signals), at most: balls, (p, phases)."""
         found = rows * self.each
         for which, bound in self.lengths:
-            found += column([_long(row) for row in (rows * which).tolist()]) * bound
+            found += arb_mat([[_long(row)] for row in (rows * which).tolist()]) * bound
         return found
 
 
@@ -122,8 +113,7 @@ class Inequalities:
         most = [exact(own.stage.boxes[f]) for own in self.phases]
         for k in range(self.last + 1):
             if not all(b < most[self.phase(k)] for b in self.bounds(f, k)):
-                why = f"the bound at sample {k} is not below what is claimed"
-                return Outcome(verdict="undecided", why=why)
+                return Outcome(verdict="undecided", why=f"sample {k}: the bound is not below the claim")
         return CONFIRMED
 
     def bounds(self, f: int, k: int) -> list[Ball]:
@@ -131,10 +121,9 @@ class Inequalities:
         n, last, p = len(self.error), len(self.nodes) - 1, self.phase(k)
         if f >= n:
             return [self._carried[n * last + f][k]]
-        ends = [self._carried[n * a + f][k] for a in range(last + 1)]
-        return [
-            x.max(y) + off[f][p].abs_upper() for (x, y), off in zip(pairwise(ends), self._off, strict=True)
-        ]
+        ends = [own[k] for own in self._carried[f : n * (last + 1) : n]]
+        off = [own[f][p].abs_upper() for own in self._off]
+        return [x.max(y) + more for (x, y), more in zip(pairwise(ends), off, strict=True)]
 
     def phase(self, k: int) -> int:
         """The phase of a sample."""
@@ -160,10 +149,10 @@ class Inequalities:
     @cached_property
     def _begun(self) -> Amplitudes:
         """xi_0, signed where it is known."""
-        still = [arb(0)] * (self.loop.width - len(self.error) - len(self.slow))
-        begun = [*self.error, *still, *(arb(0, own.first.abs_upper()) for own in self.slow)]
+        still = self.loop.width - len(self.error) - len(self.slow)
+        begun = [*self.error, *[arb(0)] * still, *(arb(0, own.first.abs_upper()) for own in self.slow)]
         near = picked(range(len(self.error)), self.loop.width).transpose(), arb_mat([[arb(0, self.radius)]])
-        return Amplitudes(column(begun), [near] if self.radius > 0 else [])
+        return Amplitudes(arb_mat([[x] for x in begun]), [near] if self.radius > 0 else [])
 
     @cached_property
     def _acting(self) -> Amplitudes:
@@ -177,14 +166,9 @@ class Inequalities:
     @cached_property
     def _entries(self) -> arb_mat:
         """Through which columns these act on e, on eta and on the input, (n + r + m, signals)."""
-        n, r, m = len(self.error), len(self.slow), self.loop.B.ncols()
-        fast = joined([[picked(range(n), n), self.loop.B, *(own for own, _ in self.winds)]])
-        kept = picked(range(r), r + m).transpose()
-        on_e, others = (
-            [self.loop.H, arb_mat(n, r), fast],
-            [arb_mat(r + m, r), kept, arb_mat(r + m, fast.ncols())],
-        )
-        return joined([on_e, others])
+        n, r, loop, winds = len(self.error), len(self.slow), self.loop, (own for own, _ in self.winds)
+        on_e = joined([[loop.H, arb_mat(n, r), picked(range(n), n), loop.B, *winds]])
+        return stacked([on_e, picked(range(r, 2 * r), on_e.ncols()), arb_mat(loop.B.ncols(), on_e.ncols())])
 
     def _gamma(self, age: Ball, order: int = 0) -> arb_mat:
         """What they do to xi in that time, (width, signals), or its derivative of an order."""
@@ -221,15 +205,14 @@ class Inequalities:
     @cached_property
     def _off(self) -> list[list[list[Ball]]]:
         """How far e may be from its chord on every piece, d^2/8 sup|e''|, by state and phase."""
+        found = []
         with ctx.workprec(_SETUP_BITS):
-            return [self._piece(a, b) for a, b in pairwise(self.nodes)]
-
-    def _piece(self, a: Fraction, b: Fraction) -> list[list[Ball]]:
-        s, square = between(exact(a).lower(), exact(b).upper()), exact((b - a) ** 2 / 8)
-        of_xi, heard = parted(self.loop.error(s, 2, later=a >= self.loop.rest), self.loop.width)
-        swings = self._within([self._gamma(s, 1)])
-        bent = self._boxes.of(of_xi) + self._heard.of(heard) + swings
-        found: list[list[Ball]] = (bent * square).tolist()
+            for a, b in pairwise(self.nodes):
+                s, square = between(exact(a).lower(), exact(b).upper()), exact((b - a) ** 2 / 8)
+                rates = self.loop.error(s, 2, later=a >= self.loop.rest)
+                of_xi, heard = parted(rates, self.loop.width)
+                bent = self._boxes.of(of_xi) + self._heard.of(heard) + self._within([self._gamma(s, 1)])
+                found.append((bent * square).tolist())
         return found
 
     # -- from sample to sample

@@ -25,7 +25,7 @@ from tubecert.recheck.plans import Plan
 from tubecert.recheck.program import Program
 from tubecert.recheck.reading import upright
 from tubecert.recheck.specification import SampledSpecification
-from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Planned, Tabled
+from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Planned, Resting, Tabled
 from tubecert.recheck.system import curve_of, knots_of
 from tubecert.recheck.terms import Matrix, Term, names, plus, replaced, slopes, times, variable
 from tubecert.recheck.times import common_period
@@ -73,15 +73,14 @@ class Course:
     @property
     def goes_on(self) -> bool:
         """Whether a plan that is repeated is one of formulas, of a period that is no longer, or begins as it ends."""
-        horizon, plan, knots = self.spec.trajectory.horizon, self.spec.trajectory, self.knots
-        if self.spec.afterwards != "repeat" or horizon is None:
+        plan, knots, sample = self.spec.trajectory, self.knots, self.spec.hardware.sample_time
+        if self.spec.afterwards != "repeat" or isinstance(plan, (Resting, AnyPlan)):
             return True
-        if knots is not None:
-            joined = knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
-            return joined and horizon % self.spec.hardware.sample_time == 0 and knots.t[-1] == horizon
-        return not isinstance(plan, Expressed) or bool(
-            common_period([*plan.x, *plan.u]).ball <= exact(horizon)
-        )
+        if isinstance(plan, Expressed):
+            return bool(common_period([*plan.x, *plan.u]).ball <= exact(plan.horizon))
+        assert knots is not None
+        joined = knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
+        return joined and plan.horizon % sample == 0 and knots.t[-1] == plan.horizon
 
     # -- windows
 
@@ -191,14 +190,11 @@ class Course:
         since = machine.delay % machine.sample_time
         if machine.hold == "middle" and all((t - since) % machine.sample_time == 0 for t in jumps):
             return [arb(0)] * m
-        reach = span * Fraction(
-            1001, 1000
-        )  # at the left end a computer's time may be that of the interval before
-        near = [
-            rows[k : bisect_right(begins, end + reach)] for k, end in enumerate([*begins[1:], begins[-1]])
-        ]
-        columns = [list(zip(*own, strict=True)) for own in near]
-        return [exact(max(max(own[j]) - min(own[j]) for own in columns)) for j in range(m)]
+        # at the left end a computer's time may be that of the interval before
+        ends = [begin + span * Fraction(1001, 1000) for begin in (*begins[1:], begins[-1])]
+        near = [zip(*rows[k : bisect_right(begins, end)], strict=True) for k, end in enumerate(ends)]
+        jumps_by_input = zip(*([max(own) - min(own) for own in column] for column in near), strict=True)
+        return [exact(max(own)) for own in jumps_by_input]
 
 
 def tops(rows: Iterable[Sequence[Ball]]) -> list[Ball]:
