@@ -190,6 +190,12 @@ def test_what_acts_within_a_sample_may_be_above_its_chord():
     assert 1.125 <= found.upper() < 1.3
 
 
+def test_what_is_no_number_bounds_nothing():
+    for wind in (float("nan"), float("inf")):
+        (found,) = plain([[0.0]], [1], [0.5], wind).bounds(0, 1)
+        assert not found < 1e300
+
+
 def test_phases_hold_the_commands_that_wait():
     stages = [Stage(k, (Fraction(1),), (Fraction(u),), ()) for k, u in ((0, 5), (10, 3), (11, 1))]
     found = [(begin, stage.start, most) for begin, stage, (most,) in phases_of(stages, 2)]

@@ -39,11 +39,8 @@ ROWS = 53  # bits, in which rows are carried
 
 def of(certificate: Certificate, budget: int) -> Iterator[Claim]:
     """Every claim; of a result that is not certified, only that it is what was written, for this specification."""
-    same, spec, proven = (
-        certificate.stated_hash == certificate.hash,
-        certificate.specification,
-        certificate.proven,
-    )
+    same = certificate.stated_hash == certificate.hash
+    spec, proven = certificate.specification, certificate.proven
     yield Claim("the hash is that of the result", None, lambda: stated(same, "something was changed"))
     repeated = {**certificate.repeated, **(proven.repeated if proven else {})}
     wrong = ", ".join(path for path, (given, own) in repeated.items() if given != own)

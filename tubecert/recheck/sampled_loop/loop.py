@@ -85,10 +85,6 @@ class Loop:
         """b: of how many earlier samples a delta acts or waits."""
         return self.whole + (self.rest > 0)
 
-    def nodes(self, pieces: int) -> list[Fraction]:
-        """Times of a sample between which nothing jumps: `pieces` equal parts, and tau'."""
-        return sorted({self.sample * Fraction(a, pieces) for a in range(pieces + 1)} | {self.rest})
-
     @cached_property
     def parts(self) -> list[arb_mat]:
         """Rows that pick e (n), zeta (z), v_1..v_b (m each), eta (r); what is heard of dy (n), u (m), zeta (z)."""

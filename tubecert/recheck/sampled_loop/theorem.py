@@ -131,8 +131,9 @@ class Inequalities:
 
     @cached_property
     def nodes(self) -> list[Fraction]:
-        """Times of a sample between which e is near a chord."""
-        return self.loop.nodes(self.recipe.pieces)
+        """Times of a sample between which nothing jumps: equal parts, and tau'."""
+        equal = {self.loop.sample * Fraction(a, self.recipe.pieces) for a in range(self.recipe.pieces + 1)}
+        return sorted(equal | {self.loop.rest})
 
     # -- signals
 
