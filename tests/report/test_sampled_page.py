@@ -16,6 +16,7 @@ from tubecert.report import pages as explained
 from tubecert.report.sampled_loop import page_of
 from tubecert.report.terminal import Terminal
 from tubecert.report.text import screen
+from tubecert.sampled_loop.file import certificate_text, read
 from tubecert.sampled_loop.record import Claim, Cleared, InputUse, Lack, Notes, Shares, Stage
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import NOTHING, filling, percents, remedy, why
@@ -188,6 +189,15 @@ def test_the_page_has_the_equations_of_the_loop_and_how_to_check_it():
     alone = markdown.render_page(page_of(sampled.certificate(sampled.SPEC + "controller: none\n")))
     assert "--spec" in alone
     assert not [told for told in ("--controller", "z_k") if told in alone]
+
+
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+def test_the_page_is_the_same_before_and_after_the_certificate_is_written(text):
+    """States are told in their own order, not in that of the alphabet, which a file has."""
+    box = "initial_state: {box: {p: [-0.1, 0.1], v: [-0.2, 0.1]}}"
+    renamed = re.sub(r"\bp\b", "z", text.replace("initial_state: {at: [0.1, 0]}", box))
+    made = sampled.certificate(renamed)
+    assert page_of(read(certificate_text(made), "it")) == page_of(made)
 
 
 def test_how_far_from_its_plan_is_drawn_where_the_plan_moves():

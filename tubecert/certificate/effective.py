@@ -6,10 +6,11 @@ import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
 
 from tubecert.records import OPEN, FormError, Json, foreign, from_json
 
+T = TypeVar("T")
 Tree = Any  # texts, lists and mappings of them, as canonical data holds
 
 
@@ -57,6 +58,10 @@ class SystemView:
     def lengths(self) -> tuple[str, ...]:
         """What has a half-width: states, then outputs."""
         return *self.states, *self.outputs
+
+    def ordered(self, named: Mapping[str, T]) -> dict[str, T]:
+        """What states and inputs have, in their order: a file has it by the alphabet."""
+        return {name: named[name] for name in (*self.states, *self.inputs) if name in named}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

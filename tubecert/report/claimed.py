@@ -40,7 +40,7 @@ def started(told: Tree, system: SystemView, whose: str) -> str:
     """The same of canonical data, where a start is within a length, in a box, or at a point."""
     if "within" in told:
         return f"within {end(Fraction(told['within']))} of the start of {whose}"
-    sides = told.get("box") or {
+    sides = system.ordered(told.get("box", {})) or {
         name: (at, at) for name, at in zip(system.states, told.get("at", ()), strict=False)
     }
     places = {name: _place(*ends) for name, ends in sides.items() if set(ends) != {"0"}}

@@ -65,7 +65,7 @@ def figures(certificate: Certificate) -> Iterator[Figure]:
     if result.tube and result.spec.effective.trajectory.kind != "equilibrium":
         yield from _deviations(result)
     if certificate.notes.filled:
-        yield _bars(certificate.notes.filled)
+        yield _bars(result.spec.effective.system.ordered(certificate.notes.filled))
 
 
 def _over_time(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Drawing]:

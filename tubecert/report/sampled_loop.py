@@ -157,9 +157,10 @@ def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     """What fills the tube of the state that is widest beside its wish, or else beside the safe set."""
     wishes, safe = result.spec.effective.tube.half_widths, result.spec.effective.part("safe_set")
     wished = [name for name in wishes if name in safe]
+    last = result.spec.effective.system.ordered(result.tube[-1].half_widths if result.tube else {})
     sizes = {
         name: width / (wishes[name] if wished else Fraction(safe[name][1]) - Fraction(safe[name][0]))
-        for name, width in (result.tube[-1].half_widths.items() if result.tube else ())
+        for name, width in last.items()
         if name in notes.long_run and name in (wished or safe)
     }
     if sizes:
@@ -201,5 +202,7 @@ def _origin(certificate: Certificate) -> Facts:
     if tables is not None:
         about = f"{len(tables.F.value)} states, the best of {evaluations} that were tried"
         rows.append(("controller", about))
-    rows += [(name, str(told)) for name, told in certificate.run.items() if not isinstance(told, dict)]
+    rows += [
+        (name, str(told)) for name, told in sorted(certificate.run.items()) if not isinstance(told, dict)
+    ]
     return _facts(rows)

@@ -202,7 +202,7 @@ class Result:
     def half_widths(self) -> dict[str, Fraction]:
         """What is proven of every state at all times, the widest of all stages; empty if nothing is certified."""
         proven = self.tube if self.verdict is Verdict.CERTIFIED else ()
-        names = proven[0].half_widths if proven else ()
+        names = self.spec.effective.system.ordered(proven[0].half_widths) if proven else ()
         return {name: max(stage.half_widths[name] for stage in proven) for name in names}
 
 

@@ -10,7 +10,7 @@ from dataclasses import fields
 from fractions import Fraction
 from typing import Final
 
-from tubecert.certificate.effective import Effective, Tree
+from tubecert.certificate.effective import Effective, SystemView, Tree
 from tubecert.digits import down, end, in_unit, short, up
 from tubecert.sampled_loop.record import Lack, Missing, Notes, Result, Shares
 from tubecert.verdict import Verdict
@@ -157,18 +157,19 @@ def filling(shares: Shares) -> str:
 
 def loop(effective: Effective) -> str:
     """The computer and the sensors: `500 Hz, delay 0.0005 s, noise p 0.001 m`."""
-    own, units = effective.part("hardware"), effective.system.units
+    own = effective.part("hardware")
     period = float(Fraction(own["sample_time"]))
     rate = f"{short(1 / period, 6)} Hz" if period < 1 else f"every {short(period, 6)} s"
-    return f"{rate}, delay {delay(own['delay'])}, noise {_noise(own['noise'], units)}"
+    return f"{rate}, delay {delay(own['delay'])}, noise {_noise(own['noise'], effective.system)}"
 
 
 def family(effective: Effective) -> str:
     """Which plans belong to a family."""
     told = effective.part("trajectory")
-    sides = [(name, ends) for box in ("x", "u") for name, ends in told.get(box, {}).items()]
+    sides = effective.system.ordered({**told.get("x", {}), **told.get("u", {})}).items()
     boxes = ", ".join(f"{name}* in [{', '.join(end(Fraction(at)) for at in ends)}]" for name, ends in sides)
-    rates = [f"|{name}*'| <= {end(Fraction(rate))}" for name, rate in told.get("input_rate", {}).items()]
+    steepest = effective.system.ordered(told.get("input_rate", {})).items()
+    rates = [f"|{name}*'| <= {end(Fraction(rate))}" for name, rate in steepest]
     return "; ".join([boxes, *rates, f"|x*' - f(x*) - B(x*) u*| <= {end(Fraction(told.get('defect', '0')))}"])
 
 
@@ -200,11 +201,11 @@ def delay(told: str) -> str:
     return f"{short(told, 6)} s" if told[:1].isdigit() or told[:1] == "." else told
 
 
-def _noise(told: Tree, units: Mapping[str, str]) -> str:
+def _noise(told: Tree, system: SystemView) -> str:
     """One length, or a size for each state."""
     if not isinstance(told, Mapping):
         return "0" if Fraction(told) == 0 else f"{end(Fraction(told))} (length)"
     alike: dict[str, list[str]] = {}
-    for name, size in told.items():
-        alike.setdefault(in_unit(end(Fraction(size)), units.get(name, "")), []).append(name)
+    for name, size in system.ordered(told).items():
+        alike.setdefault(in_unit(end(Fraction(size)), system.units.get(name, "")), []).append(name)
     return ", ".join(f"{', '.join(names)} {size}" for size, names in alike.items())
