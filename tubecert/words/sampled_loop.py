@@ -129,7 +129,7 @@ def size(bound: Fraction) -> str:
 
 def span(low: Fraction | float, high: Fraction | float) -> str:
     """Ends of a range, rounded outward; where nothing but rounding is added, as they are."""
-    outward, plain = (down(low), up(high)), (short(round(low, 12)), short(round(high, 12)))
+    outward, plain = (down(low), up(high)), [short(round(Fraction(q), 12)) for q in [low, high]]
     missed = max(abs(float(Fraction(plain[0]) - low)), abs(float(Fraction(plain[1]) - high)))
     if missed == 0 or missed > NOTHING:
         return " to ".join(outward)
