@@ -358,33 +358,24 @@ def of_plan(setting: Setting) -> tuple[Clearance, ...]:
 
 
 def of_run(setting: Setting, runs: Runs) -> tuple[Clearance, ...]:
-    """That of the first run: no proof.
-
-    Between output times it is a cubic with the slopes f + B (u + h). These lack what winds and parameters do, which
-    moves a cubic by a quarter of it and of the time between: that much is taken off.
-    """
-    model, t, x, n = setting.model, runs.t, runs.x[0], len(setting.model.states)
-    tape = Tape([*model.f, *(entry for row in model.B for entry in row)], (TIME, *model.states))
-    values = tape.run_floats([t, *x.T], t.shape)
-    B = values[n:].reshape(n, -1, len(t))
-    slope = (values[:n] + np.einsum("imk,km->ik", B, (runs.u + runs.h)[0])).T
+    """That of the first run, between output times by cubics with its own slopes: no proof."""
+    t, x, slope = runs.t, runs.x[0], runs.slope[0]
     parts = -(-_POINTS // len(t))
     s, dt = np.arange(parts)[:, None, None] / parts, np.diff(t)[:, None]
     between = (1 - s) ** 2 * (1 + 2 * s) * x[:-1] + s**2 * (3 - 2 * s) * x[1:]
     between += s * (1 - s) * dt * ((1 - s) * slope[:-1] - s * slope[1:])
-    times = t[:-1] + s[..., 0] * dt[:, 0]
-    missed = setting.certified.beside("size") * np.linalg.norm(np.linalg.inv(setting.S), 2) * dt.max() / 4
-    curve, at = np.concatenate([x, between.reshape(-1, n)]), np.concatenate([t, times.ravel()])
-    return _of_curve(setting.spec, at, curve, float(missed))
+    times = (t[:-1] + s[..., 0] * dt[:, 0]).ravel()
+    curve = np.concatenate([x, between.reshape(len(times), -1)])  # x: up to where a run was stopped
+    return _of_curve(setting.spec, np.concatenate([t, times]), curve)
 
 
-def _of_curve(spec: Spec, t: Array, x: Array, missed: float = 0.0) -> tuple[Clearance, ...]:
-    """That of a curve (K, n) at times (K,), which is known up to `missed`; nan where it has ended."""
+def _of_curve(spec: Spec, t: Array, x: Array) -> tuple[Clearance, ...]:
+    """That of a curve (K, n) at times (K,); nan where it has ended."""
     found = []
     for number, obstacle in enumerate(spec.obstacles):
         gaps = np.nan_to_num(signed_distance(obstacle, in_plane(spec, obstacle, x)), nan=np.inf)
         step = int(np.argmin(gaps))
-        gap = float(gaps[step]) - missed
+        gap = float(gaps[step])
         found.append(Clearance(obstacle=number, clearance=_finite(gap), t=float(t[step]), collides=gap <= 0))
     return tuple(found)
 
