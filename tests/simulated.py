@@ -71,6 +71,7 @@ def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **chang
     values: dict[str, Any] = {
         "t": t,
         "x": x,
+        "slope": np.gradient(x, t, axis=1),
         "x_plan": np.zeros((K, n)),
         "u_plan": np.zeros((K, m)),
         "k": zero,
@@ -86,6 +87,7 @@ def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **chang
         "unresolved": np.full(N, np.nan),
         "failures": (),
         "steps": np.ones(N),
+        "level": np.zeros(N),
     }
     return Runs(**(values | changes))
 
