@@ -195,11 +195,9 @@ class Case:
     def met(self, name: str, wish: Fraction) -> Outcome:
         """A half-width that was asked for, of a state or an output, is kept by every stage."""
         row = self._spec.plant.lengths[name]
-        widths = [
-            sum(abs(factor) * width for factor, width in zip(row, own.half_widths, strict=True))
-            for own in self._proven.stages
-        ]
-        return stated(max(widths) <= wish, "it is wider")
+        stages = (zip(row, own.half_widths, strict=True) for own in self._proven.stages)
+        widest = max(sum(abs(factor) * width for factor, width in own) for own in stages)
+        return stated(widest <= wish, "it is wider")
 
     # -- obstacles: rectangles about segments of the plan, halved where needed; exact
 
@@ -213,9 +211,10 @@ class Case:
 
         def clear(segment: Segment) -> bool:
             widths, sides = self._widths(*segment.when), [(i, *segment.x[i]) for i in pair]
-            return all(isfinite(low) and isfinite(high) for _, low, high in sides) and _apart(
-                obstacle, [(Fraction(low) - widths[i], Fraction(high) + widths[i]) for i, low, high in sides]
-            )
+            if not all(isfinite(low) and isfinite(high) for _, low, high in sides):
+                return False
+            box = [(Fraction(low) - widths[i], Fraction(high) + widths[i]) for i, low, high in sides]
+            return _apart(obstacle, box)
 
         return along(self.course.curve.root, self._budget, clear)
 
@@ -240,9 +239,7 @@ def _within(ends: Range, planned: Iterable[Ball], more: Ball) -> Outcome:
 
 def _apart(obstacle: Obstacle, box: Sequence[Range]) -> bool:
     if obstacle.center is not None and obstacle.radius is not None:
-        away = [
-            max(low - c, c - high, Fraction(0)) for c, (low, high) in zip(obstacle.center, box, strict=True)
-        ]
+        away = [max(a - c, c - b, Fraction(0)) for c, (a, b) in zip(obstacle.center, box, strict=True)]
         return away[0] ** 2 + away[1] ** 2 > obstacle.radius**2
     corners = obstacle.corners
     return all(_missed(a, b, box) for a, b in pairwise((*corners, corners[0])))
