@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from tubecert.enclosure.interval import Interval
 from tubecert.model import build
 from tubecert.sampled_loop.cells import largest_jump, steepness
+from tubecert.sampled_loop.matrices import product
 from tubecert.sampled_loop.record import Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Dynamics, Kernel, Responses
@@ -350,6 +352,20 @@ def test_integrals_of_kernels(length):
 
 def size_of(value, length):
     return np.linalg.norm(value, axis=-1, keepdims=True) if length else np.abs(value)
+
+
+@pytest.mark.parametrize("size", [1, 3, 40])
+def test_products_hold_what_their_ends_come_to_exactly(size):
+    """Of numbers themselves as of intervals; the sums are rounded 2 size - 1 times."""
+    rng = np.random.default_rng(size)
+    a, b = (rng.normal(size=(2, size)) * 10.0 ** rng.integers(-9, 9, (2, size)) for _ in "ab")
+    for reach in (0.0, 1e-3):
+        A, B = (Interval(m, m + reach * np.abs(m)) for m in (a, b.T))
+        found = product(A, B)
+        for left, right in ((A.lo, B.lo), (A.hi, B.hi), (A.lo, B.hi)):
+            exact = np.vectorize(Fraction)(left) @ np.vectorize(Fraction)(right)
+            assert (np.vectorize(Fraction)(found.lo) <= exact).all()
+            assert (np.vectorize(Fraction)(found.hi) >= exact).all()
 
 
 def test_exponentials_of_any_length():

@@ -64,7 +64,7 @@ def plant_of(remainders: Remainders, narrow: Array) -> Plant:
         H=loop.H,
         E=np.hstack([loop.E[:, :0], *(columns for columns, _ in winds)]),
         sample_time=float(loop.sample_time),
-        delay=float(loop.delay),
+        delay=float(loop.hardware.delayed),
         noise=loop.noise.each,
         noise_ball=loop.noise.length,
         magnitude=sizes.size,

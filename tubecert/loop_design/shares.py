@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from tubecert.sampled_loop.midrad import total
+from tubecert.sampled_loop.matrices import total
 from tubecert.sampled_loop.record import Notes, Shares, Stage
 from tubecert.sampled_loop.theorem import Boxes, Inequalities
 

@@ -9,7 +9,7 @@ Trusted: yes; "certified" is said in `theorem` alone.
 |---|---|
 | `record` | what a certificate says, and its file |
 | `setting` | specification and matrices -> the loop and its signals |
-| `midrad`, `exponential` | matrices known up to a radius; e^(A s) and its integrals |
+| `matrices` | interval matrices; e^(A s) and its integrals |
 | `responses` | the loop's answers to every signal, lag by lag |
 | `remainders` | what is not linear, bounded on the tube |
 | `theorem` | the inequalities, and the verdict |

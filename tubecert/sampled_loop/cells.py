@@ -12,7 +12,7 @@ from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import derivatives, free_symbols
 from tubecert.expression.matrix import jacobian
-from tubecert.model import TIME
+from tubecert.model import TIME, time_period
 from tubecert.sampled_loop.setting import Loop
 from tubecert.trajectory.family import Family
 from tubecert.trajectory.pieces import PiecewisePlan
@@ -74,13 +74,14 @@ def in_time(loop: Loop, cells: Cells) -> Cells:
 
     Where nothing else is known of an h that depends on t, t is anything from 0 on.
     """
-    moves = loop.model.h is not None and TIME in free_symbols(loop.model.h)
-    if not moves or (loop.horizon is not None and np.isfinite(cells.t.hi).all()):
+    if loop.model.h is None or TIME not in free_symbols(loop.model.h):
+        return cells
+    if loop.horizon is not None and np.isfinite(cells.t.hi).all():
         return cells
     if loop.horizon is not None:
         ends = np.linspace(0.0, fraction_bounds(loop.horizon)[1], _TIMES + 1)
-    elif loop.period is not None:
-        ends = np.linspace(0.0, float(loop.period.hi), _TIMES + 1)
+    elif (period := time_period(loop.model.h)) is not None:
+        ends = np.linspace(0.0, float(period.hi), _TIMES + 1)
     else:
         ends = np.array([0.0, np.inf])
     k, n = len(ends) - 1, len(cells)
@@ -100,17 +101,11 @@ def end_of(loop: Loop) -> Cells | None:
 def steepness(loop: Loop, count: int) -> Array | None:
     """sup |u*'_j| along the plan, (m,); None if u* jumps."""
     plan = loop.plan
-    bundle = loop.spec.trajectory.bundle
-    if bundle is not None:
+    if (bundle := loop.spec.trajectory.bundle) is not None:
         rate = bundle.input_rate
         return None if rate is None else np.array([fraction_bounds(each)[1] for each in rate])
     if plan.horizon is None or plan.is_constant:
         return np.zeros(loop.inputs)
-    return _along(loop, count)
-
-
-def _along(loop: Loop, count: int) -> Array | None:
-    plan = loop.plan
     if isinstance(plan, PiecewisePlan):
         if plan.data.interpolation == "hold":
             return None

@@ -16,9 +16,17 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from tubecert.enclosure.interval import Array, fraction_bounds
-from tubecert.sampled_loop.exponential import Exponential
-from tubecert.sampled_loop.midrad import SUMMED, UNIT, Known, lengths, total
+from tubecert.enclosure.interval import Array, Interval, fraction_bounds
+from tubecert.sampled_loop.matrices import (
+    SUMMED,
+    UNIT,
+    Exponential,
+    lengths,
+    nothing,
+    product,
+    stacked,
+    total,
+)
 from tubecert.sampled_loop.setting import Controller, Loop
 
 _AT_ONCE: Final = 400_000  # entries of a batch of rows
@@ -27,10 +35,10 @@ _AT_ONCE: Final = 400_000  # entries of a batch of rows
 class Flow(NamedTuple):
     """Outputs (R) by the parts of xi, `core` (R, a) and `eta` (R, r), and directly by n (R, n) and r_u (R, m)."""
 
-    core: Known
-    eta: Known
-    noise: Known
-    rounding: Known
+    core: Interval
+    eta: Interval
+    noise: Interval
+    rounding: Interval
 
 
 class Counts(NamedTuple):
@@ -55,40 +63,40 @@ class Dynamics:
         self.loop, self.controller = loop, controller
         self.exponential = Exponential(loop.A)
         self.n, self.m, self.z, self.q = loop.states, loop.inputs, controller.size, loop.whole
-        self.A, self.B, self.H = map(Known.exact, (loop.A, loop.B, loop.H))
+        self.A, self.B, self.H = map(Interval.exact, (loop.A, loop.B, loop.H))
         self.core_size = self.n + self.z + self.m * (self.q + 1)
-        self._N, self._M = map(Known.exact, (controller.N, controller.M))
+        self._N, self._M = map(Interval.exact, (controller.N, controller.M))
 
-    def held(self, s: Fraction) -> tuple[Known, Known]:
+    def held(self, s: Fraction) -> tuple[Interval, Interval]:
         """G0(s), of the newer input, and G1(s), of the older one, each (n, m)."""
         rest = self.loop.rest
         if s <= rest:
-            return Known.zero(self.n, self.m), self.exponential.at(s)[1] @ self.B
+            return nothing(self.n, self.m), product(self.exponential.at(s)[1], self.B)
         phi, since = self.exponential.at(s - rest)
-        return since @ self.B, phi @ (self.exponential.at(rest)[1] @ self.B)
+        return product(since, self.B), product(phi, product(self.exponential.at(rest)[1], self.B))
 
     def flow(self, s: Fraction) -> Flow:
         """c_s: e at a time s of a sample."""
         phi, whole = self.exponential.at(s)
-        return self._assembled(phi, *self.held(s), whole @ self.H)
+        return self._assembled(phi, *self.held(s), product(whole, self.H))
 
-    def _assembled(self, e: Known, newer: Known, older: Known, eta: Known) -> Flow:
+    def _assembled(self, e: Interval, newer: Interval, older: Interval, eta: Interval) -> Flow:
         """A map of xi whose newer input is delta_k (no whole sample of delay) or v_q."""
-        zero = Known.zero(self.n, self.m)
+        zero = nothing(self.n, self.m)
         if not self.q:
-            core = Known.stacked([[e + newer @ self._N, newer @ self._M, older]])
-            return Flow(core, eta, newer @ self._N, newer)
-        core = Known.stacked([[e, Known.zero(self.n, self.z), *[zero] * (self.q - 1), newer, older]])
-        return Flow(core, eta, Known.zero(self.n, self.n), zero)
+            heard = product(newer, self._N)
+            return Flow(stacked([[e + heard, product(newer, self._M), older]]), eta, heard, newer)
+        core = stacked([[e, nothing(self.n, self.z), *[zero] * (self.q - 1), newer, older]])
+        return Flow(core, eta, nothing(self.n, self.n), zero)
 
     def slope(self, s: Fraction) -> Flow:
         """c_s' = A c_s + B (what acts) + H eta, at a time that is not tau'."""
-        zero = Known.zero(self.n, self.m)
+        zero = nothing(self.n, self.m)
         newer, older = (zero, self.B) if s < self.loop.rest else (self.B, zero)
-        acting = self._assembled(Known.zero(self.n, self.n), newer, older, self.H)
-        return Flow(*(self.A @ own + more for own, more in zip(self.flow(s), acting, strict=True)))
+        acting = self._assembled(nothing(self.n, self.n), newer, older, self.H)
+        return Flow(*(product(self.A, own) + more for own, more in zip(self.flow(s), acting, strict=True)))
 
-    def _sample(self) -> Known:
+    def _sample(self) -> Interval:
         """xi without eta at the next sample, by itself, eta, n, r_u and r_z: (a, a + r + n + m + z)."""
         c, zero, past = self.controller, np.zeros, self.m * (self.q + 1)
         n, m, z, held = self.n, self.m, self.z, past + self.loop.H.shape[1]
@@ -97,26 +105,26 @@ class Dynamics:
             [c.N, c.M, zero((m, held)), c.N, np.eye(m), zero((m, z))],
             [zero((past - m, n + z)), np.eye(past - m, held + n + m + z)],
         ]
-        upper = Known.stacked([[*self.flow(self.loop.sample_time), Known.zero(n, z)]])
-        return Known.stacked([[upper], [Known.exact(np.block(lower))]])
+        upper = stacked([[*self.flow(self.loop.sample_time), nothing(n, z)]])
+        return stacked([[upper], [Interval.exact(np.block(lower))]])
 
-    def step(self) -> tuple[Known, Known]:
+    def step(self) -> tuple[Interval, Interval]:
         """AA without eta, (a, a), and its column of eta, (a, r)."""
         whole, a = self._sample(), self.core_size
         return whole[:, :a], whole[:, a : a + self.loop.H.shape[1]]
 
-    def discrete(self) -> Known:
+    def discrete(self) -> Interval:
         """How n, r_u and r_z enter at a sample, (a, n + m + z)."""
         return self._sample()[:, self.core_size + self.loop.H.shape[1] :]
 
     def outputs(self, nodes: Iterable[Fraction]) -> Flow:
         """The rows of e at every node of a sample, of delta, and of zeta."""
         n, m, z, a, r = self.n, self.m, self.z, self.core_size, self.loop.H.shape[1]
-        sent = Known.stacked([[self._N, self._M, Known.zero(m, a - n - z)]])
-        delta = Flow(sent, Known.zero(m, r), self._N, Known.exact(np.eye(m)))
-        zeta = Flow(Known.exact(np.eye(z, a, n)), *(Known.zero(z, size) for size in (r, n, m)))
+        sent = stacked([[self._N, self._M, nothing(m, a - n - z)]])
+        delta = Flow(sent, nothing(m, r), self._N, Interval.exact(np.eye(m)))
+        zeta = Flow(Interval.exact(np.eye(z, a, n)), *(nothing(z, size) for size in (r, n, m)))
         parts = zip(*map(self.flow, nodes), delta, zeta, strict=True)
-        return Flow(*(Known.stacked([[own] for own in part]) for part in parts))
+        return Flow(*(stacked([[own] for own in part]) for part in parts))
 
 
 class Kernel:
@@ -131,22 +139,22 @@ class Kernel:
         self, own: Exponential, K: Array, ends: Sequence[Fraction], *, integral: bool = False
     ) -> None:
         self.columns = K.shape[1]
-        self._at: list[tuple[float, Known]] = []
-        bent, columns = np.zeros_like(K), Known.exact(K)
+        self._at: list[tuple[float, Interval]] = []
+        bent, columns = np.zeros_like(K), Interval.exact(K)
         for a, b in pairwise(ends):
             d = fraction_bounds(b - a)[1]
-            self._at += [(0.5 * d, own.at(s)[integral] @ columns) for s in (a, b)]
-            slope = own.A @ (own.at((a + b) / 2)[0] @ columns)
-            second = slope if integral else own.A @ slope
-            bent = bent + d**3 / 12 * (swelling(own.A.mid, (b - a) / 2) @ second.above) * (1 + 1e-12)
+            self._at += [(0.5 * d, product(own.at(s)[integral], columns)) for s in (a, b)]
+            slope = product(own.A, product(own.at((a + b) / 2)[0], columns))
+            second = slope if integral else product(own.A, slope)
+            bent = bent + d**3 / 12 * (swelling(own.A.mid, (b - a) / 2) @ second.magnitude) * (1 + 1e-12)
         self._bent = bent * SUMMED
 
     def of(self, rows: Array, plus: Array | None = None, *, length: bool = False) -> Array:
         """The integrals for rows (N, n): (N, columns), or (N, 1) of lengths; `plus` (N, columns) is added to r G."""
         parts = np.zeros((len(rows), 1 if length else self.columns))
         for weight, G in self._at:
-            value = Known.exact(rows) @ G
-            size = (value if plus is None else value + Known.exact(plus)).above
+            value = product(Interval.exact(rows), G)
+            size = (value if plus is None else value + Interval.exact(plus)).magnitude
             parts += weight * (lengths(size) if length else size)
         bent = lengths(self._bent) if length else self._bent
         return np.asarray((parts + np.abs(rows) @ bent * SUMMED) * SUMMED)
@@ -154,7 +162,7 @@ class Kernel:
 
 def swelling(A: Array, s: Fraction) -> Array:
     """e^(|A| s), (n, n), from above."""
-    return Exponential(np.abs(A)).at(s)[0].above
+    return Exponential(np.abs(A)).at(s)[0].magnitude
 
 
 class _Within:
@@ -190,18 +198,18 @@ class Responses:
         Ts = loop.sample_time
         self.nodes = sorted({*(Ts * k / pieces for k in range(pieces + 1)), loop.rest})
         self._first = own.outputs(self.nodes)
-        self.count = self._first.core.rows
+        self.count = len(self._first.core.lo)
         self.rows, self.eta, missed_core, missed_eta = self._free_rows()
-        noise, rounding = self._first.noise.above, self._first.rounding.above
+        noise, rounding = self._first.noise.magnitude, self._first.rounding.magnitude
         now = {"noise": loop.noise.weigh(noise), "rounding": np.hstack([noise, rounding])}
-        self.now = self._nothing(self.count)._replace(core=missed_core, eta=missed_eta, **now)
+        self.now = self._unmoved(self.count)._replace(core=missed_core, eta=missed_eta, **now)
         self._discrete, self._within = own.discrete(), _Within(own, Ts, panels)
         sums = zip(*map(self._entered, self._batches()), strict=True)
         self.noise, self.wind, self.rounding, self.rho, self.rate, self.size = map(self._cumulated, sums)
         self.direct = [self._direct(s) for s in self.nodes]
         self.pieces = [self._piece(a, b) for a, b in pairwise(self.nodes)]
 
-    def _nothing(self, outputs: int) -> Counts:
+    def _unmoved(self, outputs: int) -> Counts:
         own, r = self.dynamics, self.loop.H.shape[1]
         sizes = (own.core_size, r, own.n + own.m, own.n + own.m, r)
         zero = np.zeros(outputs)
@@ -228,8 +236,8 @@ class Responses:
         missed_core, missed_eta = first.core.rad, first.eta.rad
         for part in self._batches():
             before, last = rows[part].reshape(-1, rows.shape[2]), slice(part.start + 1, part.stop + 1)
-            follows, slow = Known.exact(before) @ step, Known.exact(before) @ into
-            slow = slow + Known.exact(eta[part].reshape(len(before), -1))
+            follows, slow = (product(Interval.exact(before), own) for own in (step, into))
+            slow = slow + Interval.exact(eta[part].reshape(len(before), -1))
             missed_core = missed_core + _off(follows, rows[last])
             missed_eta = missed_eta + _off(slow, eta[last])
         slack = (1 + 4 * self.lags * UNIT) * SUMMED
@@ -244,7 +252,7 @@ class Responses:
         rows = self.rows[part]
         flat = rows.reshape(-1, rows.shape[2])
         e, eta = np.ascontiguousarray(flat[:, : self.loop.states]), self.eta[part].reshape(len(flat), -1)
-        jumps = (Known.exact(flat) @ self._discrete).above
+        jumps = product(Interval.exact(flat), self._discrete).magnitude
         noise = self.loop.noise.weigh(jumps[:, : self.loop.states])
         wind, *slow = self._within.of(e, eta)
         return tuple(own.reshape(*rows.shape[:2], *own.shape[1:]) for own in (noise, wind, jumps, *slow))
@@ -258,7 +266,7 @@ class Responses:
     def _direct(self, until: Fraction) -> Counts:
         n = self.loop.states
         wind, rho, rate, _ = _Within(self.dynamics, until, self._panels).of(np.eye(n))
-        return self._nothing(n)._replace(wind=wind, rho=rho, rate=rate)
+        return self._unmoved(n)._replace(wind=wind, rho=rho, rate=rate)
 
     def _piece(self, a: Fraction, b: Fraction) -> Counts:
         """How far e is from its chord between two nodes (theory, eq. 3.4)."""
@@ -266,11 +274,11 @@ class Responses:
         middle, d = (a + b) / 2, fraction_bounds(b - a)[1]
         turned = d * d / 8 * swelling(loop.A, (b - a) / 2) * SUMMED
         share = np.abs(loop.A) @ turned * SUMMED
-        core, eta, noise, rounding = (share @ part.above * SUMMED for part in own.slope(middle))
+        core, eta, noise, rounding = (share @ part.magnitude * SUMMED for part in own.slope(middle))
         phi, _ = own.exponential.at(middle)
 
         def moved(by: Array, columns: Array) -> Array:
-            return np.asarray(by @ (phi @ Known.exact(columns)).above * SUMMED)
+            return np.asarray(by @ product(phi, Interval.exact(columns)).magnitude * SUMMED)
 
         winds = (size.weigh(moved(share, K)) for K, size in loop.sudden)
         return Counts(
@@ -284,7 +292,7 @@ class Responses:
         )
 
 
-def _off(found: Known, after: Array) -> Array:
+def _off(found: Interval, after: Array) -> Array:
     """|r_(i-1) AA - r_i|, summed over the lags of `after`."""
-    missed = (found - Known.exact(after.reshape(found.mid.shape))).above
+    missed = (found - Interval.exact(after.reshape(found.lo.shape))).magnitude
     return np.asarray(np.sum(missed.reshape(after.shape), axis=0) * SUMMED)

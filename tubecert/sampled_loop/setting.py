@@ -24,7 +24,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import ZERO, Expression, constant, free_symbols, symbol
 from tubecert.expression.matrix import column, combine, multiply
 from tubecert.model import ControlAffineModel, moving_parts, time_period
-from tubecert.sampled_loop.midrad import Known, lengths, total
+from tubecert.sampled_loop.matrices import lengths, nothing, total
 from tubecert.sampled_loop.record import HexMatrix, Tables
 from tubecert.spec import Spec
 from tubecert.spec.types import Afterwards, Hardware, Hold, Knots, Vector
@@ -65,14 +65,14 @@ class Size:
 class Start:
     """x(0) - x*(0): a known vector (n,) and what may be added to it, within a box (n,) or a length."""
 
-    known: Known
+    known: Interval
     box: Array
     length: float
 
     @property
     def reach(self) -> Array:
         """sup |x_i(0) - x*_i(0)|, (n,)."""
-        return np.asarray((self.known.above[:, 0] + self.box + self.length) * (1 + 1e-15))
+        return np.asarray((self.known.magnitude[:, 0] + self.box + self.length) * (1 + 1e-15))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -122,29 +122,19 @@ class Loop:
         return self.hardware.sample_time
 
     @property
-    def delay(self) -> Fraction:
-        """tau in s."""
-        return self.hardware.delayed
-
-    @property
     def whole(self) -> int:
         """q: whole samples of the delay."""
-        return int(self.delay // self.sample_time)
+        return int(self.hardware.delayed // self.sample_time)
 
     @property
     def rest(self) -> Fraction:
         """tau': the rest of the delay, in [0, Ts)."""
-        return self.delay - self.whole * self.sample_time
+        return self.hardware.delayed - self.whole * self.sample_time
 
     @property
     def hold(self) -> Hold:
         """What the plan's input is while a command acts."""
         return self.hardware.hold
-
-    @property
-    def unit(self) -> float:
-        """The unit of rounding of the controller."""
-        return ROUNDING[self.hardware.arithmetic]
 
     @property
     def noise(self) -> Size:
@@ -246,11 +236,6 @@ class Loop:
         return None if self.horizon is None else ceil(self.horizon / self.sample_time)
 
     @cached_property
-    def period(self) -> Interval | None:
-        """A common period in t of h, an enclosure; None if there is none to be seen."""
-        return time_period(self.model.h or ())
-
-    @cached_property
     def times(self) -> Range | None:
         """The times that matter for h and the plan; None where nothing depends on t.
 
@@ -294,14 +279,13 @@ class Loop:
     def start(self) -> Start:
         """x(0) - x*(0)."""
         n, spec = self.states, self.spec
-        nothing = np.zeros(n)
         if spec.within is not None:
-            return Start(Known.exact(np.zeros((n, 1))), nothing, fraction_bounds(spec.within)[1])
+            return Start(nothing(n, 1), np.zeros(n), fraction_bounds(spec.within)[1])
         planned = Tape(self.plan.start, ()).run([], ())
         ends = spec.start_box or tuple((x, x) for x in spec.x0)
         bounds = np.array([(*fraction_bounds((a + b) / 2), fraction_bounds((b - a) / 2)[1]) for a, b in ends])
         middle, box = Interval(bounds[:, 0], bounds[:, 1]), bounds[:, 2]
-        return Start(Known.of((middle - planned).sanitised()[:, None]), box, 0.0)
+        return Start((middle - planned).sanitised()[:, None], box, 0.0)
 
 
 def driven(

@@ -25,12 +25,12 @@ from tubecert.enclosure.processor import require_ieee
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel, domain_findings
 from tubecert.sampled_loop.cells import MOST
-from tubecert.sampled_loop.midrad import SUMMED, UNIT, total
+from tubecert.sampled_loop.matrices import SUMMED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
 from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders, Sizes
 from tubecert.sampled_loop.responses import Counts, Responses
-from tubecert.sampled_loop.setting import PLAN_ROUNDING, Controller, Loop
+from tubecert.sampled_loop.setting import PLAN_ROUNDING, ROUNDING, Controller, Loop
 from tubecert.trajectory.family import Family
 from tubecert.verdict import Verdict
 
@@ -168,7 +168,7 @@ class Inequalities:
 
     def _rounding(self, boxes: Boxes) -> Array:
         """r_y (n,), r_u (m,), r_z (z,): what the controller's own arithmetic is off by, of every stage (G9)."""
-        loop, c, u = self.loop, self.controller, self.loop.unit
+        loop, c, u = self.loop, self.controller, ROUNDING[self.loop.hardware.arithmetic]
         k = c.size + loop.states + 3
         gamma = k * u / (1 - k * u) * (1 + 1e-15)
         W, Z = boxes.W.max(axis=0), boxes.Z.max(axis=0)
@@ -214,7 +214,7 @@ class Inequalities:
         early = own.rows[: min(len(k), own.lags + 1), :, :n]
         known = np.abs(early @ start.known.mid[:, 0])
         size = np.abs(early)
-        known += size @ (start.known.rad[:, 0] + start.box) + 64 * UNIT * (size @ start.known.above[:, 0])
+        known += size @ (start.known.rad[:, 0] + start.box) + 64 * UNIT * (size @ start.known.magnitude[:, 0])
         if start.length:
             known += np.sqrt(np.sum(size * size, axis=-1)) * start.length
         found = np.zeros((len(k), own.count))
