@@ -179,7 +179,7 @@ def test_the_page_has_the_equations_of_the_loop_and_how_to_check_it():
     text = markdown.render_page(page_of(sampled.certificate()))
     for told in (
         "v' = -v + (F + h) + w",
-        "u = u* + M z_k + N (y_k - x*(t_k)),   held from t_k + 0.0005 s on for 0.002 s",
+        "u = u* + M z_k + N (y_k - x*(t_k)),   held for a sample time from t_k + delay on",
         "recheck cart.certificate.json --spec SPEC.yaml",
         "recheck cart.certificate.json --controller FOLDER",
     ):

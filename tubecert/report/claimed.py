@@ -1,4 +1,4 @@
-"""What a result claims, in words: its time, its start, its plans, its radius, points."""
+"""What a result claims, in words: its time, its start, its plans, its radius, points, sizes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tubecert.certificate.effective import SystemView, Tree
-from tubecert.digits import end, in_unit, short
+from tubecert.digits import down, end, in_unit, short, up
 from tubecert.records import to_json
+from tubecert.words.sampled_loop import NOTHING
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Result
@@ -77,3 +78,17 @@ def place(states: Sequence[str], at: Witness) -> str:
     parts = [] if at.t is None else [f"t = {short(at.t, 6)} s"]
     parts += [f"{name} = {short(value, 6)}" for name, value in zip(states, at.x, strict=False)]
     return ", ".join(parts)
+
+
+def size(bound: Fraction) -> str:
+    """A half-width or a deviation, rounded up; what is as good as nothing is said in one way."""
+    return f"< {short(NOTHING)}" if 0 < bound < NOTHING else up(bound)
+
+
+def ends(low: Fraction | float, high: Fraction | float) -> str:
+    """Ends of a range, rounded outward; where nothing but rounding is added, as they are."""
+    outward, plain = (down(low), up(high)), [short(round(Fraction(q), 12)) for q in [low, high]]
+    missed = max(abs(float(Fraction(plain[0]) - low)), abs(float(Fraction(plain[1]) - high)))
+    if missed == 0 or missed > NOTHING:
+        return " to ".join(outward)
+    return f"{' to '.join(dict.fromkeys(plain))}, within {short(NOTHING)}"

@@ -10,8 +10,8 @@ from fractions import Fraction
 from typing import Final
 
 from tubecert.certificate.effective import Effective
-from tubecert.digits import near, short, up
-from tubecert.report.claimed import NOT_RECHECKED, started
+from tubecert.digits import near, up
+from tubecert.report.claimed import NOT_RECHECKED, ends, size, started
 from tubecert.report.figures_sampled import figures, period
 from tubecert.report.page import Block, Cell, Facts, Figures, Items, Listing, Page, Section, Table, Tile
 from tubecert.report.page_origin import check_again, system
@@ -20,7 +20,6 @@ from tubecert.sampled_loop.record import Certificate, Notes, Result
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import (
     assumed,
-    delay,
     extent,
     family,
     filling,
@@ -29,16 +28,14 @@ from tubecert.words.sampled_loop import (
     plan,
     promise,
     remedy,
-    size,
-    span,
 )
 
 _MOST, _ROWS = 6, 4  # states of the first screen; where there are more than four, they stand side by side
 _TILES: Final = 4
 _NOTES: Final = "What fills the tube and the points to draw the plan by"
 _LAW: Final = (
-    "y_k = x(t_k) + noise,   t_k = k * {period} s",
-    "u = u* + M z_k + N (y_k - x*(t_k)),   held from t_k + {delay} on for {period} s",
+    "y_k = x(t_k) + noise,   t_k = k times the sample time",
+    "u = u* + M z_k + N (y_k - x*(t_k)),   held for a sample time from t_k + delay on",
     "z_k+1 = F z_k + G (y_k - x*(t_k)),   z_0 = 0",
 )
 
@@ -146,7 +143,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
 def _inputs(result: Result) -> Iterator[tuple[str, str]]:
     units = result.spec.effective.system.units
     for use in result.inputs:
-        told = f"{span(*use.range)} {units.get(use.input, '')}".rstrip()
+        told = f"{ends(*use.range)} {units.get(use.input, '')}".rstrip()
         if use.limits is not None and use.share is not None:
             limits, used = " to ".join(map(near, use.limits)), up(100 * use.share, 3)
             told += f" of {limits}: {used} % of the room"
@@ -187,9 +184,7 @@ def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
 def _law(own: Effective) -> Iterator[Listing]:
     """What the computer does, if there is a controller."""
     if not is_alone(own):
-        told = own.part("hardware")
-        period = short(told["sample_time"], 6)
-        yield Listing(text="\n".join(_LAW).format(period=period, delay=delay(told["delay"])))
+        yield Listing(text="\n".join(_LAW))
 
 
 def _again(own: Effective) -> Iterator[Block]:

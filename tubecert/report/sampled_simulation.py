@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tubecert.digits import short, up
+from tubecert.report.claimed import ends
 from tubecert.report.layout import indented, kept_in, plain_table
 from tubecert.report.simulation import CAVEAT, STYLES
-from tubecert.words.sampled_loop import span
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -80,7 +80,7 @@ def _shares(own: Campaign) -> Table:
 
 def _ranges(own: Campaign) -> Iterator[str]:
     for name, went in own.went.items():
-        proven = went.proven and f", proven: {span(*went.proven)}"
+        proven = went.proven and f", proven: {ends(*went.proven)}"
         yield f"{name} went from {short(went.least)} to {short(went.greatest)}{proven or ''}"
     for i, passed in enumerate(own.passed, 1):
         yield f"obstacle {i}: {short(passed.distance)} away at least"

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Final
 from rich.text import Text
 
 from tubecert.digits import exact, up
+from tubecert.report.claimed import size
 from tubecert.report.gains import deciding
 from tubecert.report.layout import VERDICTS, plain_table
 from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sweep.grid import Axis
 from tubecert.sweep.point import Failed, Kept, Point
-from tubecert.words.sampled_loop import promise, size
+from tubecert.words.sampled_loop import promise
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import Final
 
 from tubecert.certificate.effective import Effective, SystemView, Tree
-from tubecert.digits import down, end, in_unit, short, up
+from tubecert.digits import end, in_unit, short, up
 from tubecert.sampled_loop.record import Lack, Missing, Notes, Result, Shares
 from tubecert.verdict import Verdict
 
@@ -122,20 +122,6 @@ def is_alone(effective: Effective) -> bool:
     return effective.data.get("controller") == "none"
 
 
-def size(bound: Fraction) -> str:
-    """A half-width or a deviation, rounded up; what is as good as nothing is said in one way."""
-    return f"< {short(NOTHING)}" if 0 < bound < NOTHING else up(bound)
-
-
-def span(low: Fraction | float, high: Fraction | float) -> str:
-    """Ends of a range, rounded outward; where nothing but rounding is added, as they are."""
-    outward, plain = (down(low), up(high)), [short(round(Fraction(q), 12)) for q in [low, high]]
-    missed = max(abs(float(Fraction(plain[0]) - low)), abs(float(Fraction(plain[1]) - high)))
-    if missed == 0 or missed > NOTHING:
-        return " to ".join(outward)
-    return f"{' to '.join(dict.fromkeys(plain))}, within {short(NOTHING)}"
-
-
 def percents(shares: Shares) -> dict[str, int]:
     """Whole per cents by the words of the shares, which add up to 100, or to 0; what is nothing is left out."""
     parts = {SHARES[item.name]: float(getattr(shares, item.name)) for item in fields(shares)}
@@ -160,13 +146,13 @@ def loop(effective: Effective) -> str:
     own = effective.part("hardware")
     period = float(Fraction(own["sample_time"]))
     rate = f"{short(1 / period, 6)} Hz" if period < 1 else f"every {short(period, 6)} s"
-    return f"{rate}, delay {delay(own['delay'])}, noise {_noise(own['noise'], effective.system)}"
+    return f"{rate}, delay {_delay(own['delay'])}, noise {_noise(own['noise'], effective.system)}"
 
 
 def family(effective: Effective) -> str:
     """Which plans belong to a family."""
     told = effective.part("trajectory")
-    sides = effective.system.ordered({**told.get("x", {}), **told.get("u", {})}).items()
+    sides = [pair for box in ("x", "u") for pair in effective.system.ordered(told.get(box, {})).items()]
     boxes = ", ".join(f"{name}* in [{', '.join(end(Fraction(at)) for at in ends)}]" for name, ends in sides)
     steepest = effective.system.ordered(told.get("input_rate", {})).items()
     rates = [f"|{name}*'| <= {end(Fraction(rate))}" for name, rate in steepest]
@@ -196,7 +182,7 @@ def assumed(result: Result) -> Iterator[str]:
         yield "the wind is within its bound, and otherwise arbitrary"
 
 
-def delay(told: str) -> str:
+def _delay(told: str) -> str:
     """A time, or `one sample`."""
     return f"{short(told, 6)} s" if told[:1].isdigit() or told[:1] == "." else told
 
