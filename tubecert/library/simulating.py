@@ -7,7 +7,6 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
 from typing import TYPE_CHECKING, Final, cast
 
 from tubecert.certificate.result import Result
@@ -283,7 +282,7 @@ def campaign_of(
     further = asked - 1  # the first plan has an adversary of its own
     if drawing is None or not each or not further or own.interrupted:
         return own
-    plans = partial(members_of, drawing, wishes.seed)
+    plans = members_of(drawing, wishes.seed, range(1, asked))
     found = follow(setting, loops, plans, asked=further, each=each, seed=wishes.seed, report=report)
     return replace(own, members=found, interrupted=found is None or found.plans < further)
 

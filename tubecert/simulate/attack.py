@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil, log2
+from math import ceil
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,7 +19,6 @@ from tubecert.simulate.engine import integrate
 from tubecert.simulate.problem import Batch, Disturbance, LoopProblem
 from tubecert.simulate.runs import Runs
 from tubecert.simulate.setting import Loop, Setting
-from tubecert.simulate.times import steps
 from tubecert.simulate.uncertainty import Waves, acting, adversaries, random_members
 
 _POPULATION, _ELITE, _ROUNDS = 256, 12, 4
@@ -88,8 +87,8 @@ def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress
     Its runs take a quarter of the steps of those that are `known`: what they find is a proposal.
     """
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
-    kind, problem = setting.uncertainty, replace(loop.problem, times=np.array([0.0, setting.horizon]))
-    level = max(0, ceil(log2(np.median(known.steps) / _COARSER / steps(problem, 0).count)))
+    kind, count = setting.uncertainty, ceil(np.median(known.steps) / _COARSER)
+    problem = replace(loop.problem, times=np.linspace(0.0, setting.horizon, count + 1))
     size = kind.adversary + kind.beside + (len(setting.x0) if setting.varied else 0)
     genes = rng.random((_POPULATION, size))
     kept, scores = np.zeros((0, size)), np.zeros(0)
@@ -97,7 +96,7 @@ def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress
         if report is not None:
             done, of = turn * _POPULATION, _ROUNDS * _POPULATION
             report(Step(phase=Phase.SIMULATION, name=f"{loop.controller}, adversary", done=done, of=of))
-        (runs,) = integrate([bred(setting, genes).of(problem)], tolerance=setting.tolerance, level=level)
+        (runs,) = integrate([bred(setting, genes).of(problem)], tolerance=setting.tolerance, level=0)
         found = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, found])
         order = np.argsort(-values, kind="stable")[:_ELITE]

@@ -6,11 +6,12 @@ Loops and random runs are one vector of lanes, or several where there are many. 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import takewhile
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 
@@ -26,8 +27,6 @@ from tubecert.simulate.uncertainty import usual
 from tubecert.trajectory import Plan
 
 LANES: Final = 128  # random runs of a vector: they are kept, and told of, when all of them are finished
-PLANS: Final = 25  # random plans whose runs are one vector
-Plans: TypeAlias = Callable[[range], Sequence[tuple[Plan, float]]]  # by their numbers, with their defects
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
 _HERE: Final = Serial()
@@ -251,30 +250,26 @@ def _attacked(setting: Setting, attack: Attack, seed: int, report: Progress | No
 def follow(
     setting: Setting,
     loops: Sequence[Loop],
-    plans: Plans,
+    plans: Iterator[tuple[Plan, float]],
     *,
     asked: int,
     each: int,
     seed: int,
     report: Progress | None = None,
 ) -> Members | None:
-    """Every loop that adapts along `asked` plans from number 1 on, `each` runs along each of them.
+    """Every loop that adapts along `asked` plans with their defects, `each` runs along each of them.
 
     Of an interruption what is finished is kept; None if nothing is.
     """
-    found: list[tuple[Comparison, ...]] = []
-    defects: list[float] = []
+    found, defects = list[list[Comparison]](), list[float]()
     tested = [loop for loop in loops if loop.tested]
-    try:
-        for first in range(1, asked + 1, PLANS):
+    with suppress(KeyboardInterrupt):
+        for number, (plan, defect) in enumerate(plans, start=1):
             if report is not None:
-                name, done = "random plans of the family", len(found) * each
+                name, done = "random plans of the family", (number - 1) * each
                 report(Step(phase=Phase.SIMULATION, name=name, done=done, of=asked * each))
-            part = plans(range(first, min(first + PLANS, asked + 1)))
-            found += _along(setting, tested, [plan for plan, _ in part], seed, each, first)
-            defects += [defect for _, defect in part]
-    except KeyboardInterrupt:
-        pass
+            found.append(_along(setting.along(plan), tested, seed, each, number))
+            defects.append(defect)
     if not found:
         return None
     return Members(
@@ -288,21 +283,11 @@ def follow(
     )
 
 
-def _along(
-    setting: Setting, loops: Sequence[Loop], plans: Sequence[Plan], seed: int, each: int, first: int
-) -> list[tuple[Comparison, ...]]:
-    """Every loop along every plan, the first of which has this number."""
-    around = [setting.along(plan) for plan in plans]
-    drawn = [
-        cases(own, seed, range(number * each, (number + 1) * each))
-        for number, own in enumerate(around, first)
-    ]
-    pairs = [(own, loop, case) for own, case in zip(around, drawn, strict=True) for loop in loops]
-    batches = [case.of(loop.along(own.plan).problem) for own, loop, case in pairs]
-    runs = integrate(batches, tolerance=setting.tolerance)
-    starts = [(first - 1 + place // len(loops)) * each for place in range(len(pairs))]
-    seen = [
-        compare(own, found, loop.promise, start)
-        for (own, loop, _), found, start in zip(pairs, runs, starts, strict=True)
-    ]
-    return [*zip(*[iter(seen)] * len(loops), strict=True)]
+def _along(setting: Setting, loops: Sequence[Loop], seed: int, each: int, number: int) -> list[Comparison]:
+    """Every loop along a plan by its number; output times are its knots, where steps end anyway."""
+    drawn, plan = cases(setting, seed, range(number * each, (number + 1) * each)), setting.plan
+    times = setting.times if plan.knots is None else np.array(plan.knots.t, dtype=float)
+    problems = [replace(loop.along(plan).problem, times=times) for loop in loops]
+    runs = integrate([drawn.of(problem) for problem in problems], tolerance=setting.tolerance)
+    pairs = zip(loops, runs, strict=True)
+    return [compare(setting, own, loop.promise, (number - 1) * each) for loop, own in pairs]

@@ -34,6 +34,7 @@ _PACE: Final = 0.05  # |A| times the time between two of them
 _WIDEST: Final = (
     16  # times the square of the ellipsoid from whose edge plans turn back, which is inside of the box
 )
+_LANES: Final = 25  # plans that are drawn at once
 _TRIES: Final = 20  # draws of a plan, until one keeps to the boxes
 _INSIDE: Final = 1e-3  # of a box, which curves between knots stay within
 _DEFECT: Final = 0.6  # of the limit, at most: between knots the defect of a cubic is 3/2 of that
@@ -103,23 +104,25 @@ def _linear(drift: Tape, P: Array, Q: Array) -> tuple[Array, Array]:
     return slopes[:, : len(P)], slopes[:, len(P) :]
 
 
-def members_of(drawing: Drawing, seed: int, numbers: Sequence[int]) -> list[tuple[Plan, float]]:
-    """Plans of a seed by their numbers, and the largest defect of each that was seen, |x*' - f - B u*|.
+def members_of(drawing: Drawing, seed: int, numbers: Sequence[int]) -> Iterator[tuple[Plan, float]]:
+    """Plans of a seed by their numbers, with the largest defect of each that was seen, |x*' - f - B u*|.
 
     Raises `TubecertError` if one is not found that keeps to the boxes.
     """
-    found: dict[int, tuple[Plan, float]] = {}
-    for trial in range(_TRIES):
-        left = [number for number in numbers if number not in found]
-        for number, knots in _drawn(drawing, seed, left, trial) if left else ():
-            plan = piecewise_plan(drawing.model, knots, drawing.horizon)
-            defect = _belongs(drawing, plan)
-            if defect is not None:
-                found[number] = plan, defect
-    missing = [number for number in numbers if number not in found]
-    if missing:
-        raise TubecertError([_none(drawing, missing[0])])
-    return [found[number] for number in numbers]
+    for first in range(0, len(numbers), _LANES):
+        part = numbers[first : first + _LANES]
+        found: dict[int, tuple[Plan, float]] = {}
+        for trial in range(_TRIES):
+            left = [number for number in part if number not in found]
+            for number, knots in _drawn(drawing, seed, left, trial) if left else ():
+                plan = piecewise_plan(drawing.model, knots, drawing.horizon)
+                defect = _belongs(drawing, plan)
+                if defect is not None:
+                    found[number] = plan, defect
+        for number in part:
+            if number not in found:
+                raise TubecertError([_none(drawing, number)])
+            yield found[number]
 
 
 def _drawn(drawing: Drawing, seed: int, numbers: Sequence[int], trial: int) -> Iterator[tuple[int, Knots]]:
