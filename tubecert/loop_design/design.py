@@ -129,9 +129,8 @@ class _Search:
         The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs or the
         tube leave their room, or inputs cost nothing, and for loops that forget slowly.
         """
-        if (
-            reached := self._reach(weights, STEPS if self.reference is not None or len(self.most) else 0)
-        ) is None:
+        steps = STEPS if self.reference is not None or len(self.most) else 0
+        if (reached := self._reach(weights, steps)) is None:
             return UNSTABLE
         response, W, U = reached
         if self.reference is None:
@@ -159,10 +158,7 @@ class _Search:
         if alone is None or grown is None:
             return False
         wished = np.isfinite(self.plant.wishes)
-        grows = any(
-            (with_rest > (1 + 1e-4) * without).any()
-            for with_rest, without in zip(grown[1:], alone[1:], strict=True)
-        )
+        grows = any((more > (1 + 1e-4) * less).any() for less, more in zip(alone[1:], grown[1:], strict=True))
         self.reference = np.minimum(grown[1], 1e3 * alone[1]) * (UNASKED if wished.any() else 1.0)
         self.reference[:, wished] = WISH * self.plant.wishes[wished]
         return bool(wished.any() or grows)

@@ -63,9 +63,10 @@ def propose(
                 break
             found = finer
     boxes = _fixed_point(found, boxes, report)
-    several, many = _in_stages(found, report)
-    if many is not None and (many.W[-1] < _STEADY * many.W.max(axis=0)).any():
-        found, boxes = several, many
+    if (several := _in_stages(found)) is not None:
+        many = _fixed_point(several, _nothing(several), report)
+        if (many.W[-1] < _STEADY * many.W.max(axis=0)).any():
+            found, boxes = several, many
     for share in _SHORTER:
         fewer = _shorter(found, max(1, int(share * lags)))
         if _within(fewer.of(boxes), boxes, 1 + _SETTLED):
@@ -80,16 +81,14 @@ def _shorter(found: Inequalities, lags: int) -> Inequalities:
     return replace(found, recipe=recipe, responses=found.responses.shorter(lags))
 
 
-def _in_stages(found: Inequalities, report: Report | None) -> tuple[Inequalities, Boxes | None]:
+def _in_stages(found: Inequalities) -> Inequalities | None:
     """Narrower and narrower stages, where a start or an h that begins at 0 has something to forget."""
     loop, lags = found.loop, found.recipe.lags
-    starts = sorted({0, *(lags // part for part in _STAGES if lags // part > loop.whole)})
-    if loop.samples is not None:
-        starts = [k for k in starts if k < loop.samples]
+    last = np.inf if loop.samples is None else loop.samples
+    starts = sorted({0, *(lags // part for part in _STAGES if loop.whole < lags // part < last)})
     if len(starts) == 1 or not (loop.start.reach.any() or loop.matched):
-        return found, None
-    several = replace(found, starts=tuple(starts))
-    return several, _fixed_point(several, _nothing(several), report)
+        return None
+    return replace(found, starts=tuple(starts))
 
 
 def _lags(loop: Loop, controller: Controller) -> int:
@@ -159,18 +158,11 @@ def _within(inner: Boxes, outer: Boxes, share: float) -> bool:
 
 def _stages(loop: Loop, boxes: Boxes, starts: Sequence[int]) -> tuple[Stage, ...]:
     """As decimals; what is later feeds on what is before, and has to be wider by more than that was rounded."""
-
-    def rounded(values: Array, stage: int) -> list[Fraction]:
-        wider = (1 + 2e-6) ** (stage + 1)
-        return [Fraction(up(float(value) * wider, _DIGITS)) for value in values]
-
-    model = loop.model
-    return tuple(
-        Stage(
-            start=start,
-            half_widths=dict(zip(model.states, rounded(boxes.W[g], g), strict=True)),
-            deviations=dict(zip(model.inputs, rounded(boxes.U[g], g), strict=True)),
-            memory=tuple(rounded(boxes.Z[g], g)),
-        )
-        for g, start in enumerate(starts)
-    )
+    found = []
+    for g, (start, *own) in enumerate(zip(starts, *boxes, strict=True)):
+        wider = (1 + 2e-6) ** (g + 1)
+        W, U, Z = ([Fraction(up(float(x) * wider, _DIGITS)) for x in each] for each in own)
+        widths = dict(zip(loop.model.states, W, strict=True))
+        deviations = dict(zip(loop.model.inputs, U, strict=True))
+        found.append(Stage(start=start, half_widths=widths, deviations=deviations, memory=tuple(Z)))
+    return tuple(found)

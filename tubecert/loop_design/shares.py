@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Final
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from tubecert.sampled_loop.matrices import total
 from tubecert.sampled_loop.record import Notes, Shares, Stage
 from tubecert.sampled_loop.theorem import Boxes, Inequalities
+from tubecert.trajectory.plan import Plan
 
 _POINTS: Final = 401
 
@@ -23,15 +24,12 @@ def explain(inequalities: Inequalities, stages: Sequence[Stage], evaluations: in
         first, last = (_causes(inequalities, boxes, stage) for stage in (0, len(stages) - 1))
     n, sizes = len(model.states), inequalities.phases(boxes)[1]
     constants = {"eta_size": sizes.size, "eta_rate": sizes.rate, "eta_first": sizes.first}
-    t, x, u = _points(inequalities)
-    return Notes(
+    return replace(
+        _points(inequalities.loop.plan),
         start=dict(zip(model.states, first, strict=False)),
         long_run=dict(zip(model.states, last, strict=False)),
         deviations=dict(zip(model.inputs, first[n:], strict=False)),
         constants={name: tuple(own.tolist()) for name, own in constants.items() if np.isfinite(own).all()},
-        samples_t=t,
-        samples_x=x,
-        samples_u=u,
         evaluations=evaluations,
     )
 
@@ -59,18 +57,11 @@ def _causes(inequalities: Inequalities, boxes: Boxes, stage: int) -> list[Shares
     return [Shares(**dict(zip(names, own, strict=True))) for own in np.vstack([found, rest]).T.tolist()]
 
 
-def _points(
-    inequalities: Inequalities,
-) -> tuple[tuple[float, ...], tuple[tuple[float, ...], ...], tuple[tuple[float, ...], ...]]:
+def _points(plan: Plan) -> Notes:
     """Times, states and inputs of the plan, to be drawn; none of a family."""
-    plan = inequalities.loop.plan
     if plan.allowance is not None:
-        return (), (), ()
+        return Notes()
     end = 0.0 if plan.horizon is None else float(plan.horizon)
     t = np.linspace(0.0, end, _POINTS if end else 1)
-    x, u = (side.mid for side in plan.enclose(t, t))
-    return (
-        tuple(map(float, t)),
-        tuple(tuple(map(float, row)) for row in x),
-        tuple(tuple(map(float, row)) for row in u),
-    )
+    x, u = (tuple(map(tuple, side.mid.tolist())) for side in plan.enclose(t, t))
+    return Notes(samples_t=tuple(t.tolist()), samples_x=x, samples_u=u)

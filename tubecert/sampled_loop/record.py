@@ -156,17 +156,9 @@ class Cleared:
 
 
 Missing = Literal[
-    "no_design",
-    "no_fixed_point",
-    "inputs",
-    "safe_set",
-    "start",
-    "plan",
-    "obstacle",
-    "undefined",
-    "wish",
+    "no_design", "no_fixed_point", "inputs", "safe_set", "start", "plan", "obstacle", "undefined", "wish",
     "not_proven",
-]
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
