@@ -17,7 +17,6 @@ Number = float | int | str | Fraction
 UNKNOWN: Final = "-"
 _LONG: Final = 16
 _DEGREE: Final = Fraction("3.14159265358979323846264338327950288") / 180
-_SAME: Final = Fraction(1, 10**24)  # of a number: a certificate has 30 digits
 
 
 def short(value: Number | None, digits: int = 4) -> str:
@@ -57,8 +56,8 @@ def end(value: Number | None) -> str:
     if len(text) <= _LONG:
         return text
     degrees = short(Fraction(text) / _DEGREE, 8)
-    same = abs(Fraction(text) - Fraction(degrees) * _DEGREE) <= _SAME * abs(Fraction(text))
-    return f"{degrees} deg" if same else short(value, _LONG - 4)
+    missed = abs(Fraction(text) / _DEGREE / Fraction(degrees) - 1)
+    return f"{degrees} deg" if missed < 1e-24 else short(value, _LONG - 4)
 
 
 def in_unit(text: str, unit: str) -> str:

@@ -286,10 +286,9 @@ def log1p(a: Interval) -> Interval:
 
 def _touches(a: Interval, phase: float) -> NDArray[np.bool_]:
     """Whether phase + 2 k pi may lie in `a` for some integer k; says yes in doubt."""
-    period = 2 * np.pi
     # the float error of a quotient, and of its slack, is below 1e-16 (|x| + 10) for |x| <= 2e12
     left, right = (np.maximum(1e-9, 1e-15 * np.fmin(np.abs(end), 4e12)) for end in (a.lo, a.hi))
-    return np.ceil((a.lo - phase) / period - left) <= np.floor((a.hi - phase) / period + right)
+    return np.ceil((a.lo - phase) / (2 * np.pi) - left) <= np.floor((a.hi - phase) / (2 * np.pi) + right)
 
 
 def _wave(a: Interval, function: np.ufunc, peak: float, trough: float) -> Interval:

@@ -49,7 +49,6 @@ _OF_A_COMPUTER: Final = "name the computer that it is about, hardware: {rate: 50
 IN_CONTINUOUS_TIME: Final = ("metric", "adaptation", "conditions")
 """Sections of a file that asks about a loop in continuous time."""
 
-_OF_GAINS: Final = ("metric", *(key for key in RANGES if key != "inputs"))  # what else a file may expect
 _TUBE_IN_TIME: Final = ("epsilon", "rho_a", "coordinates", "gap")
 
 
@@ -59,7 +58,7 @@ def check_machine(entries: Mapping[str, Field]) -> None:
     if "hardware" in entries:
         told = [(entries.get(key), _WITHOUT_METRIC) for key in IN_CONTINUOUS_TIME]
         told += [(tube and tube.get(key), _WIDTHS) for key in _TUBE_IN_TIME]
-        told += [(expect and expect.get(key), _EXPECTED) for key in _OF_GAINS]
+        told += [(expect and expect.get(key), _EXPECTED) for key in ("metric", *RANGES) if key != "inputs"]
         beside = "beside"
     else:
         told = [(entries.get("controller"), _OF_A_COMPUTER)]
