@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from plants import double, plant, pvtol, scalar
 
+from tubecert.loop_design.certification import certify
 from tubecert.loop_design.design import design
 from tubecert.loop_design.unfound import NoDesign
+from tubecert.spec import load_text
 
 
 def mean(W):
@@ -143,3 +145,15 @@ def test_a_remainder_without_a_tube_is_told_with_the_state():
     found = refused(wild)
     assert (found.kind, found.where) == ("no_fixed_point", 0)
     assert found.needed > found.allowed > 1
+
+
+def test_without_a_controller_the_mode_that_grows_is_named():
+    """x' = 2 x beside a state that dies away; the tube never closes, and that is not what is nonlinear."""
+    text = (
+        "{tubecert: 1, name: alone, system: {states: [y, x], inputs: [u], f: [-y, 2*x], B: [[1], [0]]},"
+        " safe_set: {y: [-1, 1], x: [-1, 1]}, trajectory: {kind: equilibrium, at: [0, 0], input: [0]},"
+        " initial_state: {at: [0, 0]}, hardware: {rate: 100}, controller: none,"
+        " disturbance: {E: [[0], [1]], bound: 0.1}}"
+    )
+    (lack,) = certify(load_text(text)).result.lacks
+    assert (lack.kind, lack.where, lack.needed) == ("no_design", "x", pytest.approx(2))

@@ -23,7 +23,7 @@ from tubecert.loop_design.design import Design, design
 from tubecert.loop_design.plant import plant_of, space_of
 from tubecert.loop_design.proposal import propose
 from tubecert.loop_design.shares import explain
-from tubecert.loop_design.unfound import NoDesign
+from tubecert.loop_design.unfound import NoDesign, refuse_unmoved
 from tubecert.model import ControlAffineModel, build
 from tubecert.planner import propose as planner
 from tubecert.progress import Phase, Progress, Step, Unit
@@ -141,11 +141,14 @@ def _told(report: Progress | None, name: str) -> Callable[[int, object], None] |
 
 
 def _tables(remainders: Remainders, narrow: Array, report: Progress | None) -> Design:
-    """What is designed; no controller has tables of nothing."""
+    """What is designed; no controller has tables of nothing, and for ever every mode has to die away."""
     loop = remainders.loop
     if loop.spec.controller != "none":
         return design(plant_of(remainders, narrow), _told(report, "controller"))
     n, m = loop.states, loop.inputs
+    if loop.horizon is None:
+        half = np.array([float(high - low) / 2 for low, high in loop.spec.safe_set])
+        refuse_unmoved(loop.A * half / half[:, None], np.zeros((n, 1)))
     shapes = {"F": (0, 0), "G": (0, n), "M": (m, 0), "N": (m, n), "W": (n,), "U": (m,)}
     return Design(**{name: np.zeros(shape) for name, shape in shapes.items()}, evaluations=0)
 

@@ -59,7 +59,7 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
     if not np.isfinite(np.concatenate(units)).all():  # too much happens within a sample
         raise NoDesign("no_design")
     observer = observe(in_units(plant, units))
-    unfound.refuse_unmoved(observer.plant)
+    unfound.refuse_unmoved(observer.plant.A, observer.plant.B)
     unfound.refuse_unheld(plant)
     search = _Search(observer, report or (lambda evaluations, value: None))
     weights = search.run(search.within())

@@ -30,13 +30,13 @@ class NoDesign(Exception):  # noqa: N818 -- an answer, not a fault
     allowed: float | None = None
 
 
-def refuse_unmoved(plant: Plant) -> None:
+def refuse_unmoved(A: Array, B: Array) -> None:
     """Modes outside of all that the inputs reach must die away by themselves; in units of order one."""
-    reached = plant.B
-    for _ in plant.A:
-        reached = orth(np.hstack([reached, plant.A @ reached]), rcond=1e-9)
+    reached = B
+    for _ in A:
+        reached = orth(np.hstack([reached, A @ reached]), rcond=1e-9)
     rest = null_space(reached.T)
-    inner = rest.T @ plant.A @ rest
+    inner = rest.T @ A @ rest
     for growth, mode in zip(*np.linalg.eig(inner.T), strict=True):
         if growth.real > -1e-6 * np.abs(inner).max():
             raise NoDesign("no_design", int(np.argmax(np.abs(rest @ mode))), float(growth.real))
