@@ -13,6 +13,7 @@ from sampled_files import SCALAR, SWING
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
+from tubecert.recheck.curve import Knots as Curved
 from tubecert.recheck.document import Node
 from tubecert.recheck.obstacles import Obstacle
 from tubecert.recheck.plans import Plan
@@ -23,6 +24,7 @@ from tubecert.recheck.sampled_loop.remainders import Remainders, Size, Slow
 from tubecert.recheck.sampled_loop.theorem import Inequalities, Phase, phases_of
 from tubecert.recheck.sampled_loop.windows import Course, course_of
 from tubecert.recheck.specification import read_sampled_specification
+from tubecert.recheck.specified.trajectory import Tabled
 from tubecert.spec import load_text
 from tubecert.spec.canonical import canonical
 
@@ -253,6 +255,18 @@ def test_inputs_that_jump_between_knots():
         assert Course(spec, None, knots).held([]) == [most]
     left = replace(spec, hardware=replace(spec.hardware, hold="left"))
     assert Course(left, None, knots).held([]) == [1]
+
+
+def test_a_plan_through_knots_begins_again_where_it_ends():
+    text = SWING.replace("rate: 10, delay: one sample, hold: left", "rate: 5")
+    zero, one = (Fraction(0),), (Fraction(1),)
+    for end, x, u, goes_on in (("1", zero, zero, True), ("1", one, zero, False), ("1", zero, one, False),
+                               ("1.1", zero, zero, False)):  # fmt: skip
+        spec = replace(read_spec(text), trajectory=Tabled("linear", Fraction(end)))
+        knots = Curved(t=(Fraction(0), Fraction(end)), x=(zero, x), u=(zero, u), held=False)
+        assert Course(spec, None, knots).goes_on is goes_on
+    longer = Curved(t=(Fraction(0), Fraction("1.2")), x=(zero, zero), u=(zero, zero), held=False)
+    assert not Course(replace(spec, trajectory=Tabled("linear", Fraction(1))), None, longer).goes_on
 
 
 def test_a_wind_through_a_row_is_a_length_or_its_components():
