@@ -24,7 +24,7 @@ from statistics import geometric_mean
 from typing import Any
 
 from tubecert.loop_design.certification import ask
-from tubecert.sampled_loop.file import read
+from tubecert.sampled_loop.record import read
 from tubecert.sampled_loop.setting import Controller
 from tubecert.sampled_loop.theorem import check
 from tubecert.spec import Spec, load

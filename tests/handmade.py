@@ -8,7 +8,6 @@ import numpy as np
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
 from tubecert.expression import number_text
-from tubecert.sampled_loop.file import seal
 from tubecert.sampled_loop.record import (
     Certificate,
     Claim,
@@ -21,6 +20,7 @@ from tubecert.sampled_loop.record import (
     Source,
     Stage,
     Tables,
+    seal,
 )
 from tubecert.spec import Knots, canonical, load_text
 from tubecert.verdict import Verdict

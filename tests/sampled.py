@@ -7,7 +7,6 @@ from typing import Any
 
 import handmade
 
-from tubecert.sampled_loop.file import seal
 from tubecert.sampled_loop.record import (
     Certificate,
     Claim,
@@ -18,6 +17,7 @@ from tubecert.sampled_loop.record import (
     Result,
     Shares,
     Stage,
+    seal,
 )
 from tubecert.spec import canonical, load_text
 from tubecert.verdict import Verdict

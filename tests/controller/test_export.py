@@ -10,8 +10,7 @@ import tubecert as tc
 from tubecert.controller.data import data_of
 from tubecert.controller.folder import files_of, write
 from tubecert.errors import TargetError, TubecertError
-from tubecert.sampled_loop.file import certificate_text
-from tubecert.sampled_loop.record import Claim, Lack
+from tubecert.sampled_loop.record import Claim, Lack, certificate_text
 from tubecert.verdict import Verdict
 
 NAMES = {"controller.c", "controller.h", "controller_data.h", "selftest.c", "README.txt"}

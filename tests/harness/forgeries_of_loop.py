@@ -26,8 +26,7 @@ import tampers  # isort: skip
 from tubecert.recheck.document import CertificateError
 from tubecert.recheck.run import recheck
 from tubecert.recheck.spelling import spelled
-from tubecert.sampled_loop.file import of_json
-from tubecert.sampled_loop.record import Claim
+from tubecert.sampled_loop.record import Claim, of_json
 from tubecert.sampled_loop.theorem import check
 from tubecert.simulation.campaign import simulate
 from tubecert.simulation.setting import setting_of

@@ -27,7 +27,7 @@ import sampled_files as files  # noqa: E402
 import test_sampled_forged as forged  # noqa: E402
 
 from tubecert.loop_design.certification import certify  # noqa: E402
-from tubecert.sampled_loop.file import certificate_text  # noqa: E402
+from tubecert.sampled_loop.record import certificate_text  # noqa: E402
 from tubecert.spec import load, load_text  # noqa: E402
 
 SIDES = {

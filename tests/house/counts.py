@@ -17,8 +17,7 @@ EDGE = {  # where data comes in or goes out, and what it is
     "certificate/file.py": "the JSON of a certificate: sealed, hashed, written and read back",
     "certificate/effective.py": "the canonical data that a certificate holds, and typed views of it",
     "certificate/belonging.py": "canonical data of a file against that of a certificate, key by key",
-    "sampled_loop/file.py": "the JSON of a certificate of a sampled loop, sealed and read back",
-    "sampled_loop/record.py": "records of a certificate of a sampled loop as JSON",
+    "sampled_loop/record.py": "records of a certificate of a sampled loop as JSON, sealed and read back",
     "report/pages.py": "the TOML of the pages",
     "report/sarif.py": "the JSON of a foreign format",
 }

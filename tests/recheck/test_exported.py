@@ -11,7 +11,7 @@ from tubecert.controller.data import data_of
 from tubecert.controller.folder import files_of, marked, write
 from tubecert.recheck.document import read
 from tubecert.recheck.sampled_loop.exported import compared, exported
-from tubecert.sampled_loop.file import certificate_text
+from tubecert.sampled_loop.record import certificate_text
 from tubecert.spec import Knots
 
 WAVE = {"trajectory": handmade.WAVE % ""}

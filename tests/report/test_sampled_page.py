@@ -16,8 +16,17 @@ from tubecert.report import pages as explained
 from tubecert.report.sampled_loop import page_of
 from tubecert.report.terminal import Terminal
 from tubecert.report.text import screen
-from tubecert.sampled_loop.file import certificate_text, read
-from tubecert.sampled_loop.record import Claim, Cleared, InputUse, Lack, Notes, Shares, Stage
+from tubecert.sampled_loop.record import (
+    Claim,
+    Cleared,
+    InputUse,
+    Lack,
+    Notes,
+    Shares,
+    Stage,
+    certificate_text,
+    read,
+)
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import NOTHING, filling, percents, remedy, why
 

@@ -8,8 +8,7 @@ from commands import run
 from loops import ABOUT, proven
 
 import tubecert as tc
-from tubecert.sampled_loop.file import certificate_text, seal
-from tubecert.sampled_loop.record import Notes
+from tubecert.sampled_loop.record import Notes, certificate_text, seal
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ from tubecert.certificate.result import Result
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.document import Node
 from tubecert.records import FormError
-from tubecert.sampled_loop.file import read
+from tubecert.sampled_loop.record import read
 
 __all__ = ["ForeignError", "belongs", "sampled_belongs"]
 

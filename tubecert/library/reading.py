@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from tubecert.certificate import file
 from tubecert.library import sampled
 from tubecert.library.specification import File
-from tubecert.sampled_loop.file import of_json
-from tubecert.sampled_loop.record import FORMAT
+from tubecert.sampled_loop.record import FORMAT, of_json
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification

@@ -17,8 +17,7 @@ from tubecert.library.certifying import ran
 from tubecert.library.specification import Specification
 from tubecert.library.stated import Stated, array, rounded, rounded_up
 from tubecert.progress import Phase, Progress, Step
-from tubecert.sampled_loop.file import certificate_text
-from tubecert.sampled_loop.record import Certificate, Result, Shares
+from tubecert.sampled_loop.record import Certificate, Result, Shares, certificate_text
 from tubecert.spec import Spec
 
 if TYPE_CHECKING:

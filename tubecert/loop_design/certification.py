@@ -27,8 +27,7 @@ from tubecert.loop_design.unfound import NoDesign, refuse_unmoved
 from tubecert.model import ControlAffineModel, build
 from tubecert.planner import propose as planner
 from tubecert.progress import Phase, Progress, Step, Unit
-from tubecert.sampled_loop.file import seal
-from tubecert.sampled_loop.record import Certificate, Claim, HexMatrix, Lack, Nominal, Notes, Result, Source
+from tubecert.sampled_loop.record import Certificate, Claim, Lack, Notes, Result, Source, seal
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.setting import Loop
 from tubecert.sampled_loop.theorem import check, undefined
@@ -166,5 +165,5 @@ def _result(loop: Loop) -> Result:
         ),
         claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
         planned=loop.knots,
-        nominal=Nominal(A=HexMatrix(loop.A), B=HexMatrix(loop.B), E=HexMatrix(loop.E)),
+        nominal=loop.nominal(),
     )

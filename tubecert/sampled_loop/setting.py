@@ -25,7 +25,7 @@ from tubecert.expression import ZERO, Expression, constant, free_symbols, symbol
 from tubecert.expression.matrix import column, combine, multiply
 from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.sampled_loop.matrices import lengths, nothing, total
-from tubecert.sampled_loop.record import HexMatrix, Tables
+from tubecert.sampled_loop.record import HexMatrix, Nominal, Tables
 from tubecert.spec import Spec
 from tubecert.spec.types import Afterwards, Hardware, Hold, Knots, Vector
 from tubecert.trajectory.family import Family
@@ -90,6 +90,10 @@ class Loop:
     B: Array
     E: Array
     slow: bool
+
+    def nominal(self) -> Nominal:
+        """A, B and E as they are written."""
+        return Nominal(**{name: HexMatrix(getattr(self, name)) for name in "ABE"})
 
     # sizes
 

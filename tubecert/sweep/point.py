@@ -17,9 +17,7 @@ from tubecert.files import Kind, read
 from tubecert.libraries import versions
 from tubecert.printable import printable_json, visible
 from tubecert.records import FormError, from_json, to_json
-from tubecert.sampled_loop import file as sampled
-from tubecert.sampled_loop.record import FORMAT as SAMPLED
-from tubecert.sampled_loop.record import Certificate as SampledCertificate
+from tubecert.sampled_loop import record as sampled
 from tubecert.spec import Setting, Spec
 from tubecert.spec.load import load_source
 from tubecert.spec.metric_file import with_metric
@@ -91,7 +89,7 @@ class Failed:
         return self.exit_code == ExitCode.INTERNAL
 
 
-Kept: TypeAlias = Certificate | SampledCertificate | Failed
+Kept: TypeAlias = Certificate | sampled.Certificate | Failed
 
 
 @lru_cache(maxsize=1)
@@ -155,8 +153,8 @@ def outcome(task: Task, point: Point) -> Kept | None:
             found = from_json(Failed, data, "error")
             return found if (found.format, found.settings) == (ERROR_FORMAT, wanted) else None
         path = str(certificate_file(task.folder, point))
-        sealed = certificate.load(path, (certificate.FORMAT, SAMPLED))
-        if sealed["format"] == SAMPLED:
+        sealed = certificate.load(path, (certificate.FORMAT, sampled.FORMAT))
+        if sealed["format"] == sampled.FORMAT:
             found = sampled.of_json(sealed, path)
             settings = found.result.spec.settings
         else:

@@ -12,8 +12,17 @@ from tubecert.errors import TubecertError
 from tubecert.loop_design.proposal import propose
 from tubecert.model import build
 from tubecert.recheck.run import Recheck, recheck
-from tubecert.sampled_loop.file import certificate_text, seal
-from tubecert.sampled_loop.record import Claim, HexMatrix, Nominal, Notes, Result, Source, Tables
+from tubecert.sampled_loop.record import (
+    Claim,
+    HexMatrix,
+    Nominal,
+    Notes,
+    Result,
+    Source,
+    Tables,
+    certificate_text,
+    seal,
+)
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.setting import Controller, Loop
 from tubecert.sampled_loop.theorem import check
