@@ -187,18 +187,6 @@ class Certification(Stated[Certificate]):
 
         return figures.tradeoff(self.result, ax)
 
-    def __str__(self) -> str:
-        from tubecert.report.certificate_page import page_of
-        from tubecert.report.text import headline
-
-        return headline(page_of(self.certificate)).plain
-
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-        from tubecert.report.certificate_page import page_of
-
-        return notebook.of_page(page_of(self.certificate))
-
     def _proven(self) -> Gains | None:
         return self.deciding if self.certified else None
 

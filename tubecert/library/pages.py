@@ -14,16 +14,16 @@ from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.reading import read
 from tubecert.library.specification import File
+from tubecert.library.stated import page_of
 from tubecert.records import OPEN, FormError, from_json
 from tubecert.report import html, markdown
-from tubecert.report.page import Page
 from tubecert.report.page_simulation import TITLES, Simulated
-from tubecert.sampled_loop.record import Certificate as SampledCertificate
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
+    from tubecert.sampled_loop.record import Certificate as SampledCertificate
 
 AnyCertificate: TypeAlias = "Certificate | SampledCertificate"
 
@@ -47,12 +47,12 @@ class Report:
     @property
     def html(self) -> str:
         """The page as one HTML file that needs nothing else."""
-        return html.render_page(self._page())
+        return html.render_page(page_of(self.certificate, self.simulated))
 
     @property
     def markdown(self) -> str:
         """The same words and tables as Markdown, without figures."""
-        return markdown.render_page(self._page())
+        return markdown.render_page(page_of(self.certificate, self.simulated))
 
     def save(self, path: File) -> None:
         """Write the page: FILE.html or FILE.md. Raises `TargetError`."""
@@ -68,15 +68,6 @@ class Report:
         """The page in a frame of its own: its style touches nothing around it."""
         style = "width: 100%; height: 45em; border: 1px solid #8884"
         return f'<iframe srcdoc="{escape(self.html)}" style="{style}" title="tubecert certificate"></iframe>'
-
-    def _page(self) -> Page:
-        if isinstance(self.certificate, SampledCertificate):
-            from tubecert.report.sampled_loop import page_of
-
-            return page_of(self.certificate, self.simulated)
-        from tubecert.report import certificate_page
-
-        return certificate_page.page_of(self.certificate, self.simulated)
 
 
 def report(result: Certification | SampledCertification | File, *, simulation: File | None = None) -> Report:

@@ -117,18 +117,6 @@ class SampledCertification(Stated[Certificate]):
 
         return SampledController(data_of(self.certificate))
 
-    def __str__(self) -> str:
-        from tubecert.report.sampled_loop import page_of
-        from tubecert.report.text import headline
-
-        return headline(page_of(self.certificate)).plain
-
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-        from tubecert.report.sampled_loop import page_of
-
-        return notebook.of_page(page_of(self.certificate))
-
 
 class SampledController:
     """The recursion of a certificate's tables in numpy: `u = controller(t, y)` once a sample, beginning with t = 0.

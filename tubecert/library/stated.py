@@ -15,6 +15,7 @@ from tubecert.certificate import file
 from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
 from tubecert.library.specification import File, Specification
+from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from tubecert.certificate.result import Certificate
-    from tubecert.sampled_loop.record import Certificate as SampledCertificate
+    from tubecert.report.page import Page
+    from tubecert.report.page_simulation import Simulated
 
 
 C = TypeVar("C", bound="Certificate | SampledCertificate")
@@ -94,8 +96,29 @@ class Stated(Generic[C]):
         """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`."""
         file.write_text(os.fspath(path), self.text, "choose another file")
 
+    def __str__(self) -> str:
+        from tubecert.report.text import headline
+
+        return headline(page_of(self.certificate)).plain
+
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self}>"
+
+    def _repr_html_(self) -> str:
+        from tubecert.report import notebook
+
+        return notebook.of_page(page_of(self.certificate))
+
+
+def page_of(certificate: Certificate | SampledCertificate, simulated: Simulated | None = None) -> Page:
+    """The page about a certificate, with what a simulation of it has shown."""
+    if isinstance(certificate, SampledCertificate):
+        from tubecert.report import sampled_loop
+
+        return sampled_loop.page_of(certificate, simulated)
+    from tubecert.report import certificate_page
+
+    return certificate_page.page_of(certificate, simulated)
 
 
 def rounded_up(value: Fraction) -> float:
