@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
     from tubecert.pipeline.synthesised import Synthesised
-    from tubecert.report.page import Page
     from tubecert.spec import Spec
 
 _OF_SEARCH: Final = Fraction(1, 2)  # of the time that is given: the certification has the rest
@@ -94,10 +93,8 @@ def run(given: Given, output: Output) -> ExitCode:
         certificate.write_text(target, found.text)
     metric = _kept_metric(found.result, kept)
     write_pages(pages, found.certificate)
-    from tubecert.report.certificate_page import page_of
-
     written = [("metric", metric)] if metric else []
-    _show(found, page_of(found.certificate), [*written, *_closing(found, system, (target, pages))], output)
+    _show(found, [*written, *_closing(found, system, (target, pages))], output)
     return found.verdict.exit_code
 
 
@@ -107,7 +104,6 @@ def _sampled(given: Given, system: Spec, files: tuple[str, Sequence[str]], outpu
     words |= {"deadline": None, "jobs": None if given.jobs == "1" else given.jobs}
     require_nothing_of_a_metric({**given.numbers, **words}, flag)
     from tubecert.library import sampled
-    from tubecert.report.sampled_loop import page_of
 
     target, pages = files
     with telling.shown(Terminal.stderr(color=output.color), output) as report:
@@ -116,7 +112,7 @@ def _sampled(given: Given, system: Spec, files: tuple[str, Sequence[str]], outpu
         certificate.write_text(target, found.text)
     write_pages(pages, found.certificate)
     after = [] if system.controller == "none" else ["export"]
-    _show(found, page_of(found.certificate), _closing(found, system, files, after), output)
+    _show(found, _closing(found, system, files, after), output)
     return found.verdict.exit_code
 
 
@@ -219,12 +215,13 @@ def _kept_metric(result: Result, target: str | None) -> str | None:
 
 
 def _show(
-    found: Certification | SampledCertification, page: Page, files: Iterable[tuple[str, str]], output: Output
+    found: Certification | SampledCertification, files: Iterable[tuple[str, str]], output: Output
 ) -> None:
     """The page on stdout, with `files` by what they are; or the certificate, with the verdict line on stderr."""
+    from tubecert.library.stated import page_of
     from tubecert.report import text
 
-    closing = list(files)
+    closing, page = list(files), page_of(found.certificate)
     target = dict(closing)["certificate"]
     data = found.text if output.json or target == certificate.STDOUT else None
     present(output, text.headline(page), lambda: text.screen(page, closing, verbose=output.verbose), data)

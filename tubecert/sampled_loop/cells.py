@@ -143,6 +143,5 @@ def largest_jump(loop: Loop) -> Array:
         times.append(knots.t[-1] + times[0])
     closest = min((b - a for a, b in pairwise(times)), default=loop.sample_time)
     met = int(loop.sample_time / closest) + 1
-    return np.array(
-        [fraction_bounds(met * max(sizes[j] for _, sizes in jumps))[1] for j in range(loop.inputs)]
-    )
+    largest = [max(each) for each in zip(*(sizes for _, sizes in jumps), strict=True)]
+    return np.array([fraction_bounds(met * size)[1] for size in largest])
