@@ -93,6 +93,7 @@ def test_what_is_lacking_is_told_with_what_helps_and_never_as_proven(lack):
     ("cart", True, "F (N)       3.1       1.2"),
     ("cart", True, "start 61 %, noise 23 %, wind 13 %,"),
     ("cart", True, "- the controller computes in double precision"),
+    ("cart", True, "before the first command acts, the actuators hold"),
 ])  # fmt: skip
 def test_the_screen_says_what_is_proven(name, verbose, told):
     certificate = sampled.certificate(TEXTS.get(name, sampled.SPEC))
