@@ -5,12 +5,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from simulated import runs as runs_by_hand
 from simulated import setting
 from systems import matrix_of, plain_model
 
 from tubecert.expression import exp, symbol
 from tubecert.report.simulation import report, verdict_line
-from tubecert.simulate.campaign import simulate
+from tubecert.simulate.campaign import SPECIFIED, Campaign, Drawn, simulate
 from tubecert.simulate.integrator import integrate
 from tubecert.simulate.judge import compare
 from tubecert.simulate.problem import Disturbance, LoopProblem
@@ -98,3 +99,30 @@ def test_a_run_in_the_tube_has_no_exit():
     found = simulate(where, [loop_of(where, "l1", Choice())], count=0, seed=0)
     assert found.drawn[0].comparison.first_exit is None
     assert compare(where, found.drawn[0].runs, None).unresolved == ()
+
+
+@pytest.mark.parametrize(
+    ("error", "interrupted", "outcome", "word"),
+    [
+        (0.02, False, "no result", "l1: no result from t = 2.5 s on, where the run depends on the steps"),
+        (0.02, True, "no result", "l1: no result from t = 2.5 s on"),
+        (0.001, True, "interrupted", "interrupted flat: 1 run finished, in which d(x*, x) reached 0.5"),
+        (0.001, False, "not falsified", "d(x*, x) reached 0.5 of its bound in 1 run"),
+    ],
+)
+def test_what_is_no_result_and_what_is_missing_is_told(error, interrupted, outcome, word):
+    where = setting("flat")
+    own, t = loop_of(where, "l1", Choice()), np.linspace(0, 4, 41)
+    still = np.zeros((1, 41, 2))
+    distance = np.where(t == 4, 0.5 * where.reach, 0.0)[None]
+    doubt = {
+        "error": np.array([error * where.rho]),
+        "unresolved": np.array([2.5 if error > 0.01 else np.nan]),
+    }
+    made = runs_by_hand(t, still, distance, **doubt)
+    drawn = Drawn(loop=own, runs=made, comparison=compare(where, made, replace(own.promise, decay=None)))
+    kept = {"uncertainty": SPECIFIED, "attacks": (), "count": 0, "seed": 0, "interrupted": interrupted}
+    data, words = words_of(Campaign(setting=where, drawn=(drawn,), **kept))
+    assert data["outcome"] == outcome
+    assert data["loops"][0]["no_result"] == (outcome == "no result")
+    assert word in words

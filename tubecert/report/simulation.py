@@ -173,8 +173,8 @@ def _stopped(part: _Part, item: Stopped) -> Text:
 def _unresolved(part: _Part, item: RunAt) -> Text:
     since = UNKNOWN if item.t is None else f"{short(item.t)} s"
     return Text(
-        f"{part.loop.controller}: from t = {since} on the run depends on the steps of the integration: "
-        f"the loop is unstable, or too fast to be followed; {part.run(item)}"
+        f"{part.loop.controller}: no result from t = {since} on, where the run depends on the steps of the "
+        f"integration: the loop is unstable, or too fast to be followed; {part.run(item)}"
     )
 
 

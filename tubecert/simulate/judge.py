@@ -28,7 +28,7 @@ from tubecert.simulate.setting import Setting
 from tubecert.spec import Spec
 from tubecert.verdict import Verdict
 
-USABLE: Final = 1e-2  # of rho: a run with a larger error estimate is no result
+_USABLE: Final = 1e-2  # of rho: a run with a larger error estimate is no result
 _EXACT: Final = 1e-6  # what rounding may add to a bound that is met with equality
 _SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "speed")
 _LISTED: Final = 20  # of the runs that left, stopped or came to nothing
@@ -188,7 +188,7 @@ def merged(parts: Sequence[Comparison]) -> Comparison:
 
 def _judged(setting: Setting, runs: Runs, first: int) -> _Judged:
     """A run that was stopped has left the tube if it was far outside: its error estimate is void, its exit is not."""
-    usable = runs.error <= USABLE * setting.rho
+    usable = runs.error <= _USABLE * setting.rho
     room = _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
     peaks = runs.worst
     left = usable & (peaks.deviation.value > setting.rho * (1 + room))
