@@ -161,7 +161,9 @@ def test_inputs_stay_in_their_ranges(least, expected):
 def test_a_bound_is_broken_only_beyond_the_error_of_the_run(share, outside):
     where = setting("flat")
     given = replace(quiet_runs(share), error=np.full(2, 0.005 * where.rho))
-    assert compare(where, given, promised(decay=None)).first_outside == outside
+    found = compare(where, given, promised(half_widths={"p": 1.0, "v": where.rho}, decay=None))
+    assert found.first_outside == outside
+    assert broken(found) == ({"tube", "deviation", "half-width of v"} if outside else set())
 
 
 def test_a_large_error_is_no_result():
@@ -219,7 +221,7 @@ def h_of(text):
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("0.25*sin(t)", "|h| is"),
+        ("0.201*sin(t)", "|h| is"),
         ("0.19*sin(2*t)", "|dh/dt| is"),
         ("0.1*sin(t) + 0.1*v", "|dh/dx| is"),
         ("0.1", "|h| at the start is"),
@@ -238,8 +240,10 @@ def test_an_uncertainty_outside_its_class_is_an_error(text, what):
 def test_an_uncertainty_in_its_class_passes_and_may_leave_it_after_the_tube_is_left():
     where = setting("flat")
     check_class(where, quiet_runs(), h_of("0.2*sin(t)"), "uncertainty.h")
-    outside = quiet_runs(50.0)
-    check_class(where, outside, h_of("0.2*sin(t)*(1 + 0*p)"), "uncertainty.h")
+    growing = h_of("0.2*sin(t)*(1 + t)")
+    check_class(where, quiet_runs(50.0), growing, "uncertainty.h")  # inside at t = 0 only
+    with pytest.raises(TubecertError):
+        check_class(where, quiet_runs(), growing, "uncertainty.h")
 
 
 @pytest.fixture
