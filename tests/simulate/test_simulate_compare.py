@@ -287,6 +287,21 @@ def test_bounds_are_those_of_the_theory(numbers, kind):
     assert (found.decay is None) == (kind == RATES)
 
 
+def test_what_unknown_parameters_do_beside_the_inputs_counts(numbers):
+    """(7.8) with zb = D_r, and beta_r in the defect of D(t)."""
+    constants = {"residual_size": Bound(below=0.0, above=0.5), "residual_push": Bound(below=0.0, above=0.6)}
+    result = replace(numbers.result, constants={**numbers.result.constants, **constants})
+    c, recipe = numbers, numbers.result.proof.of[DISTANCE.key]
+    Gamma, q, s1 = map(
+        float, (recipe.adaptation_rate, 2 * recipe.predictor_gain, c["h_t"] + c["h_x"] * float(recipe.speed))
+    )
+    most, drag = c["h"] + float(recipe.projection_radius), 0.5 / q
+    expected = (most**2 / Gamma + (drag + (drag**2 + 2 * most * s1 / (q * Gamma)) ** 0.5) ** 2) ** 0.5
+    found = promise(replace(numbers, result=result), DISTANCE)
+    assert found.bounds["xtilde"] == pytest.approx(expected, rel=1e-12)
+    assert found.decay.defect == pytest.approx(c["plan_defect_metric"] + 0.6)
+
+
 def test_pushes_are_bounded_where_metric_and_inputs_are_constant(numbers):
     """B'M gamma_s changes with x by |B| A, with t by |B| A |x*'|, and |x*'| <= |f + B u*| + |p|."""
     assert class_of(numbers, 2, 1).push is None
