@@ -20,7 +20,6 @@ from tubecert.records import to_json
 from tubecert.simulate.campaign import follow
 from tubecert.simulate.families import drawing_of, members_of
 from tubecert.simulate.reading import adopted
-from tubecert.simulate.record import members_data
 from tubecert.simulate.setting import Choice, loop_of, setting_of
 from tubecert.spec import Knots, load_text
 from tubecert.spec.types import Table
@@ -111,16 +110,16 @@ def test_a_family_whose_plans_cannot_be_kept_to_is_told():
 @pytest.mark.slow
 def test_the_certified_loop_keeps_to_every_plan():
     setting, found = followed(4, 2)
-    assert (found.plans, found.each) == (3, 2)
-    (loop,) = found.followed
+    assert (found.plans, found.runs_each) == (3, 2)
+    (loop,) = found.loops
     assert loop.comparison.runs == 6
     assert not loop.comparison.left_the_tube
     assert not loop.comparison.violations
     assert loop.comparison.worst["distance"].bound <= setting.reach
-    assert 0 < found.defect <= 0.01
-    data = json.loads(json.dumps(to_json(members_data(found))))
+    assert 0 < found.largest_defect <= 0.01
+    data = json.loads(json.dumps(to_json(found)))
     assert data["loops"][0]["runs"] == 6
-    assert data["largest_defect"] == found.defect
+    assert data["largest_defect"] == found.largest_defect
 
 
 @pytest.mark.slow
@@ -130,7 +129,7 @@ def test_an_interruption_keeps_the_plans_that_were_followed():
         raise KeyboardInterrupt
 
     _, found = followed(6, 1, plans=interrupted)
-    assert (found.asked, found.plans, found.followed[0].comparison.runs) == (5, 2, 2)
+    assert (found.asked, found.plans, found.loops[0].comparison.runs) == (5, 2, 2)
 
 
 @pytest.mark.slow
@@ -138,8 +137,8 @@ def test_gains_that_are_too_small_leave_some_tube():
     """What is reported of further plans is measured: a filter that is far too slow leaves the tube along them."""
     slow = Choice(bandwidth=Fraction(1, 20), adaptation_rate=Fraction(100))
     _, found = followed(3, 6, slow, seconds=3)
-    assert found.followed[0].comparison.left_the_tube
-    assert found.followed[0].comparison.first_exit is not None
+    assert found.loops[0].comparison.left_the_tube
+    assert found.loops[0].comparison.first_exit is not None
 
 
 @pytest.mark.slow
@@ -159,7 +158,7 @@ def test_a_plan_whose_x_jumps_is_not_covered():
         return iter([(piecewise_plan(drawing.model, joined), 0.0)])
 
     _, found = followed(2, 3, plans=jumping)
-    assert found.followed[0].comparison.left_the_tube
+    assert found.loops[0].comparison.left_the_tube
 
 
 @pytest.mark.parametrize("option", ["--members", "--plan"])

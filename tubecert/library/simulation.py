@@ -37,9 +37,7 @@ class Simulation:
     @property
     def outcome(self) -> Outcome:
         """`not falsified`, `falsified`, `tube left`, `no result`, `interrupted` or `nothing claimed`."""
-        from tubecert.simulate.record import outcome
-
-        return outcome(self.campaign)
+        return self._found().outcome
 
     @property
     def falsified(self) -> bool:

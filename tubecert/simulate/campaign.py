@@ -21,6 +21,7 @@ from tubecert.simulate.attack import Cases, cases, worst
 from tubecert.simulate.engine import integrate
 from tubecert.simulate.judge import Comparison, check_class, compare, merged
 from tubecert.simulate.problem import Disturbance
+from tubecert.simulate.record import FollowedData, LoopData, MembersData
 from tubecert.simulate.runs import Runs, joined
 from tubecert.simulate.setting import Loop, Setting
 from tubecert.simulate.uncertainty import usual
@@ -69,28 +70,6 @@ class Attack:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Followed:
-    """What random runs along random plans of a family found against a loop: run i is along plan 1 + i // `each`."""
-
-    loop: Loop
-    comparison: Comparison
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Members:
-    """Further random plans of a family: `each` runs of every loop along each; `asked` is how many there were to be.
-
-    `defect` is the largest |x*' - f - B u*| of them that was seen.
-    """
-
-    asked: int
-    plans: int
-    each: int
-    defect: float
-    followed: tuple[Followed, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Campaign:
     """Everything that was simulated; `uncertainty` says which h is drawn, `members`: further plans of a family."""
 
@@ -101,35 +80,7 @@ class Campaign:
     count: int
     seed: int
     interrupted: bool
-    members: Members | None = None
-
-    @property
-    def comparisons(self) -> tuple[tuple[Loop, Comparison], ...]:
-        """Every comparison with its loop."""
-        drawn = [(item.loop, item.comparison) for item in self.drawn]
-        attacked = [
-            (item.loop, found)
-            for item in self.attacks
-            for found in (item.comparison, item.worst_comparison)
-            if found is not None
-        ]
-        followed = self.members.followed if self.members else ()
-        return (*drawn, *attacked, *((item.loop, item.comparison) for item in followed))
-
-    @property
-    def falsified(self) -> bool:
-        """Whether a promise was broken."""
-        return any(found.violations for _, found in self.comparisons)
-
-    @property
-    def left(self) -> bool:
-        """Whether a loop that is meant to stay in the tube left it, promised or not."""
-        return any(loop.tested and found.left_the_tube for loop, found in self.comparisons)
-
-    @property
-    def unreliable(self) -> bool:
-        """Whether some run of a loop that is tested is no result: its own error estimate is too large, or it failed."""
-        return any(loop.tested and found.no_result for loop, found in self.comparisons)
+    members: MembersData | None = None
 
 
 def simulate(
@@ -256,7 +207,7 @@ def follow(
     each: int,
     seed: int,
     report: Progress | None = None,
-) -> Members | None:
+) -> MembersData | None:
     """Every loop that adapts along `asked` plans with their defects, `each` runs along each of them.
 
     Of an interruption what is finished is kept; None if nothing is.
@@ -272,13 +223,14 @@ def follow(
             defects.append(defect)
     if not found:
         return None
-    return Members(
+    return MembersData(
         asked=asked,
         plans=len(found),
-        each=each,
-        defect=max(defects),
-        followed=tuple(
-            Followed(loop=loop, comparison=merged(rows)) for loop, *rows in zip(tested, *found, strict=True)
+        runs_each=each,
+        largest_defect=max(defects),
+        loops=tuple(
+            FollowedData(loop=LoopData.of(loop), comparison=merged(rows))
+            for loop, *rows in zip(tested, *found, strict=True)
         ),
     )
 

@@ -5,15 +5,17 @@ The words are chosen with care: a simulation that finds nothing has not falsifie
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from tubecert.records import INLINE, Json, to_json
-from tubecert.simulate.campaign import Attack, Campaign, Drawn, Members
 from tubecert.simulate.judge import Clearance, Comparison, of_plan, of_run, of_tube
 from tubecert.simulate.problem import LoopGains
 from tubecert.simulate.setting import Loop, Setting
+
+if TYPE_CHECKING:
+    from tubecert.simulate.campaign import Attack, Campaign, Drawn
 
 FORMAT: Final = "tubecert-simulation/1"
 Outcome = Literal["falsified", "tube left", "no result", "interrupted", "not falsified", "nothing claimed"]
@@ -167,12 +169,13 @@ class Summary:
 
 def summary(campaign: Campaign, certificate: str) -> Summary:
     """What was found; `certificate` is the hash of the certificate that was compared with."""
-    setting, members = campaign.setting, campaign.members
-    own = setting.uncertainty
+    setting, members, own = campaign.setting, campaign.members, campaign.setting.uncertainty
+    loops = tuple(_drawn(item, setting) for item in campaign.drawn)
+    attacks = tuple(_attack(item, setting) for item in campaign.attacks)
     return Summary(
         format=FORMAT,
         name=setting.spec.name,
-        outcome=outcome(campaign),
+        outcome=_outcome([*_told(loops, attacks, members)], interrupted=campaign.interrupted),
         certificate=certificate,
         horizon=setting.horizon,
         rho=setting.rho,
@@ -180,37 +183,37 @@ def summary(campaign: Campaign, certificate: str) -> Summary:
         uncertainty=campaign.uncertainty,
         bounds=BoundsData(h=own.h, h_x=own.h_x, h_t=own.h_t, h_initial=own.h_initial),
         seed=campaign.seed,
-        loops=tuple(_drawn(item, setting) for item in campaign.drawn),
-        attacks=tuple(_attack(item, setting) for item in campaign.attacks),
+        loops=loops,
+        attacks=attacks,
         obstacles=ObstaclesData(plan=of_plan(setting), tube=of_tube(setting)),
-        members=None if members is None else members_data(members),
+        members=members,
     )
 
 
-def outcome(campaign: Campaign) -> Outcome:
-    """The outcome in a word or two."""
-    if campaign.falsified:
+def _outcome(found: Sequence[FollowedData], *, interrupted: bool) -> Outcome:
+    """What all runs came to; a loop that is not meant to stay in the tube has no say but by a broken promise."""
+    tested = [own.comparison for own in found if own.loop.tested]
+    if any(own.comparison.violations for own in found):
         return "falsified"
-    if campaign.left:
+    if any(own.left_the_tube for own in tested):
         return "tube left"
-    if campaign.unreliable:
+    if any(own.no_result for own in tested):
         return "no result"
-    if campaign.interrupted:
+    if interrupted:
         return "interrupted"
-    return "not falsified" if any(loop.promise for loop, _ in campaign.comparisons) else "nothing claimed"
+    return "not falsified" if any(own.loop.covered for own in found) else "nothing claimed"
 
 
-def members_data(found: Members) -> MembersData:
-    """What further plans of a family came to."""
-    return MembersData(
-        asked=found.asked,
-        plans=found.plans,
-        runs_each=found.each,
-        largest_defect=found.defect,
-        loops=tuple(
-            FollowedData(loop=LoopData.of(item.loop), comparison=item.comparison) for item in found.followed
-        ),
-    )
+def _told(
+    loops: Sequence[DrawnData], attacks: Sequence[AttackData], members: MembersData | None
+) -> Iterator[FollowedData]:
+    """Every comparison with its loop."""
+    yield from loops
+    yield from members.loops if members else ()
+    for own in attacks:
+        yield FollowedData(loop=own.loop, comparison=own.random.comparison)
+        if own.adversary is not None:
+            yield FollowedData(loop=own.loop, comparison=own.adversary.comparison)
 
 
 def _drawn(item: Drawn, setting: Setting) -> DrawnData:
