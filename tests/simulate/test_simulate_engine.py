@@ -115,8 +115,7 @@ def test_loops_agree_with_dop853(controller):
     expected = dop853(right_hand_side(controller, gains), z0, case.times)
     found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-5)
     assert not found.failures
-    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-5
-    assert found.error[0] <= 5e-5
+    assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     if controller == "l1":
         assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-5
         assert np.abs(found.sigma_hat[0] - expected[:, 4:5]).max() < 1e-4
@@ -168,7 +167,7 @@ def test_a_wind_that_aims(aim):
     blowing = {"wind": 0.5, "aim": float(aim), "gusting": [0.0, np.pi / 2]}
     h = replace(h, beside=h.beside._replace(**{name: np.array([value]) for name, value in blowing.items()}))
     found = integrate(case, START, h, tolerance=1e-5)
-    assert np.abs(found.x[0] - dop853(rate, START[0], case.times)).max() < 1e-5
+    assert np.abs(found.x[0] - dop853(rate, START[0], case.times)).max() <= found.error[0] <= 5e-5
 
 
 def scalar(f, B):
@@ -263,7 +262,7 @@ def test_state_dependent_inputs_agree_with_dop853(controller):
     expected = dop853(slanted_rate(controller, gains), z0, case.times)
     found = integrate(case, start, Disturbance.from_expressions(SLANTED.h, SLANTED, 1), tolerance=1e-5)
     assert not found.failures
-    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-5
+    assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     assert found.distance[0, 0] == pytest.approx(
         np.sqrt(np.array([0.2, flat(-0.25)]) @ np.linalg.solve([[1, -0.5], [-0.5, 1]], [0.2, flat(-0.25)])),
         rel=1e-9,
@@ -377,5 +376,5 @@ def test_an_f_that_depends_on_time_agrees_with_dop853():
     expected = dop853(rate, np.concatenate([START[0], np.zeros(4)]), case.times)
     found = integrate(case, START, Disturbance.from_expressions(wavy_h(), model, 1), tolerance=1e-5)
     assert not found.failures
-    assert np.abs(found.x[0] - expected[:, :2]).max() < 1e-5
+    assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-5

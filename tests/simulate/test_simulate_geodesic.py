@@ -28,7 +28,7 @@ def model(W):
 
 def connected(geodesics, p, *ends):
     with np.errstate(all="ignore"):
-        return geodesics.connect(np.asarray(p, dtype=float), np.array(ends, dtype=float).T)
+        return geodesics.connect(np.array([p], dtype=float).T, np.array(ends, dtype=float).T)
 
 
 def solved(system, p, q, degree=5):

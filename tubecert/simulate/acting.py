@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from tubecert.model import TIME, ControlAffineModel
 from tubecert.simulate.problem import Disturbance
 
 _STEEP: Final = 3.0  # how much more than a sine the wave of a wind is a square
+_NOTHING: Final = 1e-300  # so small that nothing is divided by less
 _THIN: Final = 0.05  # of the layer: where a wind that aims turns round
 
 
@@ -46,7 +48,8 @@ class Plant:
         outputs = [*model.f, *(base or [ZERO] * m), *(e for row in E for e in row), *(row[0] for row in rest)]
         self._tape = Tape([*outputs, *([] if constant else entries)], inputs)
         self._input = Tape(entries, inputs)
-        self._ends = np.cumsum([n, m, n * k, len(rest)])
+        ends = np.cumsum([0, n, m, n * k, len(rest), 0 if constant else n * m]).tolist()
+        self._parts = [slice(a, b) for a, b in pairwise(ends)]
         self._sizes = n, m, k
 
     def terms(self, t: float, x: Array, theta: Array) -> Terms:
@@ -54,7 +57,7 @@ class Plant:
         n, m, k = self._sizes
         N = x.shape[1]
         values = self._tape.run_floats_silenced([np.array(t), *x, *theta], (N,))
-        f, base, E, rest, B = np.split(values, self._ends)
+        f, base, E, rest, B = (values[part] for part in self._parts)
         own = B.reshape(n, m, N) if self._constant is None else self._constant
         return Terms(f, own, base, E.reshape(n, k, N), rest)
 
@@ -89,6 +92,7 @@ class Acting:
         self._frequency = _joined([part.frequency for part in parts])  # (W, N)
         self._phase = _joined([part.phase - part.wave @ part.centre for part in parts])
         self._push = np.concatenate([part.push for part in parts])
+        self._pushes = bool(self._push.any())
         self._radius = np.concatenate([part.radius for part in parts])
         self._layer = np.repeat([part.layer for part in parts], sizes)
         beside = zip(*(part.beside for part in parts), strict=True)
@@ -111,20 +115,16 @@ class Acting:
         """h (m, N) at x (n, N), where `push` (m, N) is B'M gamma_s."""
         h = base * self._based
         if len(self._phase):
-            angle = self._frequency * t + (self._wave * x).sum(axis=1) + self._phase
-            h += (self._amplitude * np.sin(angle)[:, None]).sum(axis=0)
-        if self._push.any():
-            h += self._push / np.sqrt((push**2).sum(axis=0) + self._layer**2) * push
-        size = np.sqrt((h**2).sum(axis=0))
-        return np.asarray(h * np.where(size > self._radius, self._radius / size, 1.0))
+            angle = self._frequency * t + np.einsum("win,in->wn", self._wave, x) + self._phase
+            h += np.einsum("wjn,wn->jn", self._amplitude, np.sin(angle))
+        if self._pushes:
+            h += self._push / np.sqrt(np.einsum("jn,jn->n", push, push) + self._layer**2) * push
+        size = np.sqrt(np.einsum("jn,jn->n", h, h))
+        return np.asarray(h * np.minimum(1.0, self._radius / np.maximum(size, _NOTHING)))
 
     def wind(self, t: float, terms: Terms, pushes: tuple[Array, Array]) -> Array:
         """E w and what unknown parameters do, (n, N); `pushes`: M gamma_s and B B'M gamma_s."""
-        found = (
-            terms.rest.sum(axis=0) * 0 + terms.rest * self._unknown
-            if len(terms.rest)
-            else np.zeros_like(terms.f)
-        )
+        found = terms.rest * self._unknown if len(terms.rest) else np.zeros_like(terms.f)
         if not self._wind.any():
             return found
         aims = [(terms.E * way[:, None]).sum(axis=0) for way in pushes]

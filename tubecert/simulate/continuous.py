@@ -2,10 +2,11 @@
 
 x' = f + B(u* + k + u_a + h) + E w, (0.1) with (0.4). The stages are those of the exponential Runge-Kutta method of
 Krogstad: between them h is the polynomial of time through the stages so far, and the fast part flows under it. Without
-a fast part this is classical RK4. The feedback (0.5) is the smallest k with phi_0 + phi_1'k <= 0: k = 0 if phi_0 <= 0,
-else -phi_0 phi_1/|phi_1|^2, where phi_0 = -2 gamma_s(0)'M(f(x*) + B(x*)u*) + 2 gamma_s(1)'M(f(x) + B(x)u*) + 2 rate E
-and phi_1 = 2 B'M gamma_s(1). Source: S. Krogstad, Generalized integrating factor methods for stiff PDEs, J. Comput.
-Phys. 203, 2005.
+a fast part this is classical RK4. Of second order is what a moving B does to the fast part, and its projection, which
+the flow over the whole step has, and those up to the stages have not. The feedback (0.5) is the smallest k with
+phi_0 + phi_1'k <= 0: k = 0 if phi_0 <= 0, else -phi_0 phi_1/|phi_1|^2, where phi_0 = -2 gamma_s(0)'M(f(x*) + B(x*)u*)
++ 2 gamma_s(1)'M(f(x) + B(x)u*) + 2 rate E and phi_1 = 2 B'M gamma_s(1). Source: S. Krogstad, Generalized integrating
+factor methods for stiff PDEs, J. Comput. Phys. 203, 2005.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from tubecert.simulate.geodesics import FOUND, REASONS, Geodesic, Geodesics
 from tubecert.simulate.lanes import SHARES
 from tubecert.simulate.problem import Batch, LoopProblem
 from tubecert.simulate.times import END, MIDDLE, START, Grid, Reference
+from tubecert.trajectory import Plan
 
 INFEASIBLE: Final = 10
 DIVERGED: Final = 20
@@ -53,7 +55,7 @@ class Continuous:
     `_y` (Y, N) is the fast part of every lane at the start of the step (`flows.blocks`).
     """
 
-    def __init__(self, batches: Sequence[Batch], grid: Grid) -> None:
+    def __init__(self, batches: Sequence[Batch], grid: Grid, plans: Sequence[Plan]) -> None:
         first = batches[0].problem
         n, m = len(first.model.states), len(first.model.inputs)
         problems = [batch.problem for batch in batches]
@@ -64,6 +66,8 @@ class Continuous:
         self._acting = Acting([batch.acting for batch in batches], first.model, first.E, first.rest)
         self._geodesics = Geodesics(first.model, first.degree, self._N)
         self._at, self._blown = blocks(n, m), bool(first.E or first.rest)
+        places = [next(i for i, plan in enumerate(plans) if plan is problem.plan) for problem in problems]
+        self._plans = np.repeat(places, sizes) if len(plans) > 1 else None
         self._limit = np.repeat([problem.limit for problem in problems], sizes)
         self._predicts = np.repeat([problem.terms.predicts for problem in problems], sizes)
         self._roots, self._groups = np.ones(self._N), list[_Group]()
@@ -110,7 +114,7 @@ class Continuous:
     def at(self, step: int, stage: int, x: Array) -> Array:
         """f + B(u* + k + h) + E w (n, N); what u_a has added to x meanwhile is added here."""
         t = float(self._grid.start[step] + SHARES[stage] * self._grid.length[step])
-        plan = Reference(*(part[step, _SIDES[stage]] for part in self._grid.plan))
+        plan = self._plan(step, _SIDES[stage])
         if stage == 0:
             self._stages.clear()
         elif self._groups:
@@ -119,9 +123,7 @@ class Continuous:
         terms = self._acting.terms(t, x)
         geodesic = self._geodesics.connect(plan.x, x)
         self._stop(geodesic.status != FOUND, geodesic.status)
-        ahead = terms.f + (
-            terms.B @ plan.u[:, None] if terms.B.ndim == 2 else np.einsum("ijn,j->in", terms.B, plan.u)
-        )
+        ahead = terms.f + times(terms.B, plan.u)
         push = _reached(terms.B, geodesic.end)
         k = self._feedback(plan, ahead, push, geodesic)
         h = self._acting.h(t, x, terms.base, push)
@@ -132,12 +134,17 @@ class Continuous:
         slope = ahead + times(terms.B, k + h)
         return slope if wind is None else slope + wind
 
+    def _plan(self, step: int, side: int) -> Reference:
+        """The plans of all lanes, (.., 1) if that is one."""
+        found = (part[step, side] for part in self._grid.plan)
+        return Reference(*(found if self._plans is None else (part[:, self._plans] for part in found)))
+
     def _near(self, x: Array, plan: Array) -> Array:
-        """x, and the plan (n,) for lanes that are stopped because they are nowhere near it, or were before."""
-        off = x - plan[:, None]
-        near = np.abs(off) <= _FAR * (1.0 + np.abs(plan[:, None]))  # not for nan
-        self._stop(~(near.all(axis=0) & ((off**2).sum(axis=0) <= self._limit**2)), DIVERGED)
-        return np.where(self.stopped, plan[:, None], x) if self.stopped.any() else x
+        """x, and the plan for lanes that are stopped because they are nowhere near it, or were before."""
+        off = x - plan
+        most = np.minimum(self._limit, _FAR * (1.0 + np.abs(plan).max(axis=0)))
+        self._stop(~(np.einsum("in,in->n", off, off) <= most * most), DIVERGED)  # not for nan
+        return np.where(self.stopped, plan, x) if self.stopped.any() else x
 
     def _stop(self, lanes: NDArray[np.bool_], why: NDArray[np.int64] | int) -> None:
         if lanes.any():
@@ -145,12 +152,12 @@ class Continuous:
 
     def _feedback(self, plan: Reference, ahead: Array, push: Array, geodesic: Geodesic) -> Array:
         """k (m, N) of (0.5); `ahead` is f(x) + B(x)u*, `push` is phi_1/2."""
-        lost, gained = plan.speed @ geodesic.start, (geodesic.end * ahead).sum(axis=0)
+        lost, gained = (plan.speed * geodesic.start).sum(axis=0), np.einsum("in,in->n", geodesic.end, ahead)
         phi = self._decay * geodesic.energy - 2 * lost + 2 * gained
-        reach = (push**2).sum(axis=0)
+        reach = np.einsum("jn,jn->n", push, push)
         steep = (phi > 0) & (reach == 0)
         self._stop(steep & (phi > _ROUNDING * (np.abs(lost) + np.abs(gained))), INFEASIBLE)
-        return np.where((phi > 0) & (reach > 0), -phi / (2 * reach), 0.0) * push
+        return np.where(reach > 0, np.minimum(-phi, 0.0) / (2 * reach), 0.0) * push
 
     def _flown(self, step: int, stage: int, x: Array) -> Array:
         """What u_a has added to the slow state until a stage (n, N); it is V times the mean of B so far."""
@@ -158,8 +165,7 @@ class Continuous:
             self._prepare(step, x)
         V = np.zeros((self._at.V.stop - self._at.V.start, self._N))
         for group, flow in zip(self._groups, self._own, strict=True):
-            y = group.fast.advance(flow, self._begun(group, stage), whole=stage == 3)
-            V[:, group.lanes] = y[self._at.V]
+            V[:, group.lanes] = group.fast.idle(flow, self._begun(group, stage), whole=stage == 3)
         return times(self._stages[stage - 1].B, V)
 
     def _prepare(self, step: int, x: Array) -> None:
@@ -194,7 +200,7 @@ class Continuous:
         if not self._groups:
             return 0.0
         for group, flow in zip(self._groups, self._own, strict=True):
-            self._y[:, group.lanes] = group.fast.advance(flow, self._begun(group, 4), whole=True)
+            self._y[:, group.lanes] = group.fast.advance(flow, self._begun(group, 4))
         a, b, c, d = (own.B for own in self._stages)
         moved = times(a if a.ndim == 2 else (a + 2 * (b + c) + d) / 6, self._y[self._at.V])
         self._y[self._at.V] = 0.0
@@ -204,15 +210,16 @@ class Continuous:
 
     def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
         """What is seen of the lanes at the start of a step; `off` is x - x*."""
-        at, y, plan, u = self._at, self._y, *(part[step, START] for part in self._grid.plan[::2])
+        at, y = self._at, self._y
+        plan = self._plan(step, START)
         u_a = y[at.u_a].copy()
         return {
             **self._seen,
             "u_a": u_a,
             "sigma_hat": y[at.sigma_hat].copy(),
             "xtilde": y[at.xi] / self._roots,
-            "u": u[:, None] + self._seen["k"] + u_a,
-            "off": self._seen["x"] - plan[:, None],
+            "u": plan.u + self._seen["k"] + u_a,
+            "off": self._seen["x"] - plan.x,
             "slope": slope + times(self._stages[0].B, u_a),
         }
 
@@ -241,4 +248,4 @@ def _norm(z: Array) -> Array:
 
 def _reached(B: Array, m: Array) -> Array:
     """B'm (m, N)."""
-    return np.asarray(B.T @ m if B.ndim == 2 else (B * m[:, None]).sum(axis=0))
+    return np.asarray(B.T @ m if B.ndim == 2 else np.einsum("ijn,in->jn", B, m))

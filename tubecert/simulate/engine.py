@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Final
 
 import numpy as np
@@ -14,25 +13,26 @@ from tubecert.simulate.continuous import Continuous
 from tubecert.simulate.lanes import Found, follow
 from tubecert.simulate.problem import Batch
 from tubecert.simulate.runs import Failure, Peak, Runs, Worst
-from tubecert.simulate.times import Grid, steps
+from tubecert.simulate.times import START, Grid, steps
+from tubecert.trajectory import Plan
 
+_SEEN: Final = ("x", "slope", "k", "u_a", "sigma_hat", "h", "xtilde", "distance")  # at output times
 _LEVELS: Final = 7  # of steps: the last ones are 2^6 times shorter than the first
 _AGREEING: Final = 0.02  # of the horizon: two levels that stop a lane this near to each other are believed
 _LIVED: Final = 16  # steps that a lane must have come: what stops it earlier may be nothing but their length
 _PATIENCE: Final = 2  # levels over which the change of a run must fall to less than half (theory: to 1/256)
-_DOUBTFUL: Final = 4  # the level from which on a run that does not converge is given up
-_DEAR: Final = 3  # the level from which on five tolerances will do
+_DOUBTFUL: Final = 5  # the level from which on a run that does not converge is given up
+_DEAR: Final = 2  # the level from which on five tolerances will do
 _ENOUGH: Final = 5.0
-_BEFORE: Final = (
-    1 / 8
-)  # of the change one level before: an error is no smaller, for a change may be small by luck
+_LUCK: Final = 2.0  # times a change an error may be, where k has kinks ...
+_BEFORE: Final = 1 / 8  # ... and times the change before
 _ESTIMATE: Final = 0.01  # of R_H: what sigma_hat may change
 
 
 def integrate(batches: Sequence[Batch], *, tolerance: float, level: int | None = None) -> tuple[Runs, ...]:
     """The runs of every batch, all as lanes of one vector, to an error of about `tolerance` in |S x|, P = S'S.
 
-    Batches have the same model, plan and times. A lane that cannot be integrated so far has a larger `error` than asked
+    Batches have the same model and times. A lane that cannot be integrated so far has a larger `error` than asked
     for, and `unresolved` says from when on; it is given up as soon as halving its steps no longer helps, which is so
     where the loop itself amplifies every difference. One that diverges or has no geodesic is stopped and listed in
     `failures`, and the others go on. With a `level` (0: the longest steps) runs are proposals on this level alone,
@@ -41,7 +41,7 @@ def integrate(batches: Sequence[Batch], *, tolerance: float, level: int | None =
     if not tolerance > 0:
         raise ValueError("tolerance must be positive")
     if not batches or any(not batch.beside(batches[0]) for batch in batches):
-        raise ValueError("batches must be of the same model, plan and times")
+        raise ValueError("batches must be of the same model and times")
     lanes = _Lanes(batches)
     if level is None:
         lanes.halve(tolerance)
@@ -55,6 +55,7 @@ class _Lanes:
 
     def __init__(self, batches: Sequence[Batch]) -> None:
         self.batches, self.problem = batches, batches[0].problem
+        self.plans = list({id(batch.problem.plan): batch.problem.plan for batch in batches}.values())
         self.ends = np.cumsum([0, *(len(batch.x0) for batch in batches)])
         self.N = int(self.ends[-1])
         self.found: Found | None = None
@@ -82,9 +83,9 @@ class _Lanes:
 
     def run(self, lanes: NDArray[np.intp], level: int) -> Grid:
         """Takes lanes over all steps of a level."""
-        grid = steps(self.problem, level)
+        grid = steps(self.problem, level, self.plans)
         own = [batch.of(lanes[(lanes >= a) & (lanes < b)] - a) for batch, a, b in self._parts()]
-        system = Continuous([batch for batch in own if len(batch.x0)], grid)
+        system = Continuous([batch for batch in own if len(batch.x0)], grid, self.plans)
         finer = follow(system, grid.start, grid.length, grid.outputs)
         for place in np.flatnonzero(finer.stopped):
             self.reasons[int(lanes[place])] = system.reason(int(place), int(finer.stopped[place]))
@@ -106,18 +107,20 @@ class _Lanes:
         apart = self._length(own.seen["x"][..., lanes] - coarser.seen["x"][..., lanes])
         change = np.nan_to_num(apart.max(axis=0), nan=np.inf)
         moved = own.seen["sigma_hat"][..., lanes] - coarser.seen["sigma_hat"][..., lanes]
-        settled = np.sqrt((moved**2).sum(axis=1)).max(axis=0) <= self.room[lanes]
+        own_peak, its_peak = (found.peak["sigma_error"][lanes] for found in (own, coarser))
+        moved = np.maximum(np.sqrt((moved**2).sum(axis=1)).max(axis=0), np.abs(own_peak - its_peak))
         failed, before = own.stopped[lanes] != 0, coarser.stopped[lanes] != 0
         agree = np.abs(own.ended[lanes] - coarser.ended[lanes]) <= _AGREEING * self.problem.horizon
         agree &= np.searchsorted(grid.start, own.ended[lanes]) >= _LIVED
-        told = np.maximum(change, self.changes[level - 1, lanes] * _BEFORE if level > 1 else 0.0)
+        told = np.maximum(_LUCK * change, self.changes[level - 1, lanes] * _BEFORE if level > 1 else 0.0)
         self.error[lanes] = np.where(failed, np.inf, told)
         self.changes[level, lanes] = change
         beyond = ~(apart <= tolerance)
         first = self.problem.times[np.argmax(beyond, axis=0)]
         self.unresolved[lanes] = np.where(beyond.any(axis=0), first, np.nan)
-        near = (change <= tolerance) | (level >= _DEAR)
-        done = np.where(failed, before & agree, near & settled & (told <= _ENOUGH * tolerance))
+        worst = np.maximum(change / tolerance, moved / self.room[lanes])
+        near = (worst <= (_ENOUGH if level >= _DEAR else 1.0)) & (told <= _ENOUGH * tolerance)
+        done = np.where(failed, before & agree, near)
         return np.asarray(done | self._hopeless(lanes, level))
 
     def _length(self, z: Array) -> Array:
@@ -136,40 +139,31 @@ class _Lanes:
 
     def runs(self) -> tuple[Runs, ...]:
         """Batch by batch."""
-        return tuple(self._runs(slice(a, b)) for _, a, b in self._parts())
+        grid = steps(self.problem, 0, self.plans)
+        return tuple(self._runs(batch.problem.plan, slice(a, b), grid) for batch, a, b in self._parts())
 
-    def _runs(self, lanes: slice) -> Runs:
-        found, plan = self.found, steps(self.problem, 0)
+    def _runs(self, plan: Plan, lanes: slice, grid: Grid) -> Runs:
+        found, own = self.found, next(i for i, each in enumerate(self.plans) if each is plan)
         assert found is not None
+        times, stopped = found.peak_time, np.flatnonzero(found.stopped[lanes]) + lanes.start
+        peaks = {name: Peak(value=peak[lanes], time=times[name][lanes]) for name, peak in found.peak.items()}
         seen = {name: np.moveaxis(part[..., lanes], -1, 0) for name, part in found.seen.items()}
-        own = {item.name for item in fields(Runs)}
-        at = plan.outputs
-        stopped = np.flatnonzero(found.stopped[lanes])
         return Runs(
             t=np.array(self.problem.times, dtype=float),
-            x_plan=plan.plan.x[at, 0],
-            u_plan=plan.plan.u[at, 0],
-            worst=Worst(
-                **{
-                    name: Peak(value=peak[lanes], time=found.peak_time[name][lanes])
-                    for name, peak in found.peak.items()
-                }
-            ),
+            x_plan=grid.plan.x[grid.outputs, START, :, own],
+            u_plan=grid.plan.u[grid.outputs, START, :, own],
+            worst=Worst(**peaks),
             least=found.least[:, lanes].T,
             greatest=found.greatest[:, lanes].T,
             error=self.error[lanes],
             unresolved=self.unresolved[lanes],
             failures=tuple(
-                Failure(
-                    lane=int(place),
-                    t=float(found.ended[lanes][place]),
-                    reason=self.reasons[lanes.start + int(place)],
-                )
-                for place in stopped
+                Failure(lane=lane - lanes.start, t=float(found.ended[lane]), reason=self.reasons[lane])
+                for lane in stopped.tolist()
             ),
             steps=self.steps[lanes],
             level=self.level[lanes],
-            **{name: part for name, part in seen.items() if name in own},
+            **{name: seen[name] for name in _SEEN},
         )
 
 

@@ -21,7 +21,7 @@ from tubecert.simulate.problem import LoopGains
 
 _TURN: Final = 1.0  # rad between two looks at the projection on the first level, half as far on the next
 _MOST_HALVINGS: Final = 12  # of a step
-_ORDER: Final = 10  # of Taylor's polynomial
+_ORDER: Final = 7  # of Taylor's polynomial
 _LAYERED: Final = 0.5  # within a smooth layer of this or less sigma_hat slows down over a part of a turn
 
 
@@ -45,7 +45,7 @@ class Flow(NamedTuple):
     """Flows of (y, p, p', p'') for B (n, m) or (n, m, N), where p is h, with E w after it where a wind blows.
 
     The time is in shares of the step for p. (.., Y, Z) over `half` and `whole` of it; (.., Z, Z) over a `part`, of
-    which `parts` make half a step; `rows` (.., 4 parts m, Z): sigma_hat after every half of a part.
+    which `parts` make a step; `rows` (.., 2 parts m, Z): sigma_hat after every half of a part.
     """
 
     half: Array
@@ -62,7 +62,7 @@ class Fast:
 
     def __init__(self, terms: Terms, gains: LoopGains, P: Array, m: int, forces: int) -> None:
         self.terms, self.gains, self.P, self.forces = terms, gains, P, forces
-        self.at = blocks(len(P), m)
+        self.at, self._m = blocks(len(P), m), m
         self.root = np.sqrt(gains.adaptation_rate or 1.0)
         layer = gains.smooth or 0.0
         self.limit = gains.projection_radius / np.sqrt(1 + layer)  # 2.5: within this F <= 0
@@ -80,7 +80,7 @@ class Fast:
             powers.append(powers[-1] @ powers[-1])
         own = (powers[-2][:, : self.at.end], powers[-1][:, : self.at.end], powers[1], rows)
         half, whole, part, rows = own if B.ndim == 3 else [flow[0] for flow in own]
-        return Flow(half, whole, part, rows, 2 ** (halvings - 2), length, B)
+        return Flow(half, whole, part, rows, 2 ** (halvings - 1), length, B)
 
     def _speed(self, B: Array) -> float:
         """How fast y turns, in rad/s: omega, g and sqrt(Gamma) |S B|."""
@@ -116,26 +116,27 @@ class Fast:
         G[shift, shift + F] = 1.0
         return G
 
-    def advance(self, flow: Flow, z: Array, whole: bool) -> Array:
-        """y (Y, N) after the whole step, or half of it, from z = (y, p, p', p'') (Z, N)."""
-        y = _applied(flow.whole if whole else flow.half, z)
-        if not self.terms.adapts:
-            return y
-        rows = flow.rows if whole else flow.rows[..., : flow.rows.shape[-2] // 2, :]
-        m = self.at.V.stop - self.at.V.start
-        seen = _applied(rows, z).reshape(-1, m, z.shape[1])
-        touching = np.flatnonzero((seen**2).sum(axis=1).max(axis=0) > self.limit**2)
-        if len(touching):
-            y[:, touching] = self._caught(flow, z, touching, flow.parts * (1 + whole))
+    def idle(self, flow: Flow, z: Array, whole: bool) -> Array:
+        """V (m, N) after the whole step or half of it, from z = (y, p, p', p'') (Z, N), were the projection idle."""
+        return _applied((flow.whole if whole else flow.half)[..., self.at.V, :], z)
+
+    def advance(self, flow: Flow, z: Array) -> Array:
+        """y (Y, N) after the whole step, from z = (y, p, p', p'') (Z, N)."""
+        y = _applied(flow.whole, z)
+        if self.terms.adapts:
+            seen = _applied(flow.rows, z).reshape(-1, self._m, z.shape[1])
+            touching = np.flatnonzero((seen**2).sum(axis=1).max(axis=0) > self.limit**2)
+            if len(touching):
+                y[:, touching] = self._caught(flow, z, touching)
         return y
 
-    def _caught(self, flow: Flow, z: Array, lanes: NDArray[np.intp], count: int) -> Array:
-        """y of some lanes after so many parts of the step, with the projection."""
-        at, dt = self.at, flow.length / flow.parts / 2
+    def _caught(self, flow: Flow, z: Array, lanes: NDArray[np.intp]) -> Array:
+        """y of some lanes after all parts of the step, with the projection."""
+        at, dt = self.at, flow.length / flow.parts
         shared = flow.part.ndim == 2
         part, B = (flow.part, flow.B) if shared else (flow.part[lanes], flow.B[..., lanes])
         z = z[:, lanes]
-        for _ in range(count):
+        for _ in range(flow.parts):
             before, z = z[at.sigma_hat], _applied(part, z)
             cut = self._cut(before, z[at.sigma_hat])
             z[at.sigma_hat] -= cut
@@ -146,6 +147,8 @@ class Fast:
     def _cut(self, before: Array, after: Array) -> Array:
         """What Proj of 2.5 takes out of sigma_hat (m, N) that goes from before to after, along its middle."""
         radius, nu, left = self.gains.projection_radius, self.gains.smooth, self._held(after)
+        if self._m == 1 and not nu:
+            return after - left
         for _ in range(2 if nu else 1):
             middle = (before + left) / 2
             square = np.maximum((middle**2).sum(axis=0), radius**2 / 4)
@@ -158,13 +161,15 @@ class Fast:
 
     def _held(self, sigma: Array) -> Array:
         """The nearest point of the ball."""
+        if self._m == 1:
+            return np.clip(sigma, -self.gains.projection_radius, self.gains.projection_radius)
         size, radius = np.sqrt((sigma**2).sum(axis=0)), self.gains.projection_radius
         return np.asarray(sigma * (radius / np.maximum(size, radius)))
 
 
 def times(B: Array, u: Array) -> Array:
     """B u (n, N) for B (n, m) or (n, m, N) and u (m, N)."""
-    return np.asarray(B @ u if B.ndim == 2 else (B * u).sum(axis=1))
+    return np.asarray(B @ u if B.ndim == 2 else np.einsum("ijn,jn->in", B, u))
 
 
 def _applied(M: Array, z: Array) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import Expression, free_symbols
+from tubecert.expression import ZERO, Expression, free_symbols
 from tubecert.expression.matrix import Matrix
 from tubecert.model import ControlAffineModel
 
@@ -27,7 +27,7 @@ REASONS: Final = {
     UNRESOLVED: "the geodesic needs a polynomial of a higher degree",
 }
 _EXTRA_NODES: Final = 2
-_LAST: Final = 1e-12  # of the energy: after a step that gains as little, no other one is taken
+_LAST: Final = 1e-12  # of the energy: what a step gains that is not taken; covectors are wrong by its root
 _QUICK: Final = 8  # steps with the constant Hessian
 _MOST: Final = 40  # of Newton's steps
 _HALVINGS: Final = 12
@@ -55,13 +55,13 @@ class Geodesic(NamedTuple):
 class _Curve(NamedTuple):
     """Of polynomials: energy (N,), gradient by the coefficients (n, K, N), the variation of the squared speed (N,).
 
-    `factor` has the Cholesky factors of W at the nodes, entries of (Q, N); `W` (n, n, N) is that of the middle.
+    `m` (n, Q, N) is M gamma_s at the nodes; `W` (n, n, N) is that of the middle.
     """
 
     energy: Array
     gradient: Array
     uneven: Array
-    factor: dict[tuple[int, int], Array]
+    m: Array
     W: Array
 
 
@@ -71,23 +71,25 @@ class Geodesics:
     def __init__(self, model: ControlAffineModel, degree: int, lanes: int) -> None:
         used = free_symbols(e for row in model.W for e in row)
         n, self._calls = len(model.states), 0
-        self._moving = [i for i, name in enumerate(model.states) if name in used]
+        moving = [i for i, name in enumerate(model.states) if name in used]
         self.a = np.zeros((n, degree - 1, lanes))
-        entries = [entry for W in (model.W, *(model.W_x[i] for i in self._moving)) for entry in _lower(W)]
-        self._tape = Tape(entries, model.states)
         self._triangle = np.tril_indices(n)
-        if self._moving:
+        slopes = [(i, place, e) for i in moving for place, e in enumerate(_lower(model.W_x[i])) if e != ZERO]
+        self._tape = Tape([*_lower(model.W), *(e for _, _, e in slopes)], model.states)
+        self._slopes = [(i, [place for j, place, _ in slopes if j == i]) for i in moving]
+        if moving:
             self._s, self._weight, self._phi, self._slope = _polynomials(degree)
             self._softness = np.linalg.inv(2 * (self._slope * self._weight) @ self._slope.T)
         else:
             self._M = np.linalg.inv(self._full(self._tape.run_floats([np.zeros(())] * n, ())))
 
     def connect(self, p: Array, q: Array) -> Geodesic:
-        """From p (n,) to q (n, N)."""
-        span = q - p[:, None]
-        if not self._moving:
+        """From p (n, 1) or (n, N) to q (n, N)."""
+        span = q - p
+        if not self._slopes:
             m = self._M @ span
-            return Geodesic(np.zeros(q.shape[1], dtype=np.int64), (span * m).sum(axis=0), m, m, self.a)
+            status = np.zeros(q.shape[1], dtype=np.int64)
+            return Geodesic(status, np.einsum("in,in->n", span, m), m, m, self.a)
         found = self._quick(p, span)
         self._calls += 1
         if self._calls % _WATCHED == 1:
@@ -95,7 +97,7 @@ class Geodesics:
             found.status[found.energy > straight * (1 + _LONGER)] = NOT_FOUND
         left = np.flatnonzero(found.status)
         if len(left):
-            own = self._newton(p, span[:, left], self.a[:, :, left])
+            own = self._newton(_some(p, left), span[:, left], self.a[:, :, left])
             for whole, part in zip(found, own, strict=True):
                 whole[..., left] = part
         self.a = found.a
@@ -103,60 +105,49 @@ class Geodesics:
 
     def _quick(self, p: Array, span: Array) -> Geodesic:
         """With the Hessian of a constant metric."""
-        found, lanes, a = _nothing(self.a), np.arange(span.shape[1]), self.a
+        found, lanes, a = None, np.arange(span.shape[1]), self.a
         for _ in range(_QUICK):
             curve = self._expand(p, span, a)
             step = np.einsum(
                 "kl,iln->ikn", self._softness, np.einsum("ijn,jkn->ikn", curve.W, curve.gradient)
             )
-            gain = (curve.gradient * step).sum(axis=(0, 1))
+            gain = np.einsum("ikn,ikn->n", curve.gradient, step)
             a = a - step
             done = (gain <= _LAST * curve.energy) & np.isfinite(curve.energy)
-            self._settle(found, lanes, done, (curve, gain, span, a))
+            if found is None:
+                found = _settled(curve, a)  # mostly of all lanes
+                found.status[~done] = NOT_FOUND
+            else:
+                _settle(found, lanes, done, _settled(curve, a))
             left = ~done & np.isfinite(curve.energy)
             if not left.any():
                 break
-            lanes, span, a = lanes[left], span[:, left], a[:, :, left]
+            lanes, p, span, a = lanes[left], _some(p, left), span[:, left], a[:, :, left]
+        assert found is not None
         return found
-
-    def _settle(
-        self,
-        found: Geodesic,
-        lanes: NDArray[np.intp],
-        done: NDArray[np.bool_],
-        last: tuple[_Curve, Array, Array, Array],
-    ) -> None:
-        """Keeps the lanes that are done, whose last step is taken: what depends on it are the covectors at the ends."""
-        curve, gain, span, a = last
-        own = lanes[done]
-        ends = {key: part[[0, -1]][:, done] for key, part in curve.factor.items()}
-        v = span[:, None, done] + np.matmul(self._slope[:, [0, -1]].T, a[:, :, done])
-        m = _solved(ends, v)
-        found.a[:, :, own] = a[:, :, done]
-        found.energy[own] = curve.energy[done] - gain[done] / 2
-        found.start[:, own], found.end[:, own] = m[:, 0], m[:, 1]
-        resolved = curve.uneven[done] <= _UNEVEN * curve.energy[done]
-        found.status[own] = np.where(resolved, FOUND, UNRESOLVED)
 
     def _newton(self, p: Array, span: Array, before: Array) -> Geodesic:
         """With the Hessian itself and line search, from the segment or the curve before, whichever is shorter."""
-        found = _nothing(before)
+        n, _, N = before.shape
+        nothing = np.zeros((n, N))
+        found = Geodesic(np.full(N, NOT_FOUND), np.zeros(N), nothing, nothing.copy(), np.zeros_like(before))
         straight, warm = (self._expand(p, span, a).energy for a in (np.zeros_like(before), before))
         found.status[~np.isfinite(straight)] = NOT_POSITIVE
         lanes = np.flatnonzero(np.isfinite(straight))
-        span, a = span[:, lanes], np.where(warm <= straight, before, 0.0)[:, :, lanes]
+        a = np.where(warm <= straight, before, 0.0)[:, :, lanes]
+        p, span = _some(p, lanes), span[:, lanes]
         for _ in range(_MOST):
             if not len(lanes):
                 break
             curve = self._expand(p, span, a)
             step = self._newton_step(p, span, a, curve.gradient)
-            gain = (curve.gradient * step).sum(axis=(0, 1))
+            gain = np.einsum("ikn,ikn->n", curve.gradient, step)
             share = self._share(p, span, (a, step, curve.energy))
             a = a - share * step
             done = (gain <= _LAST * curve.energy) & (share == 1)
-            self._settle(found, lanes, done, (curve, gain, span, a))
+            _settle(found, lanes, done, _settled(curve, a))
             left = ~done & (share > 0)
-            lanes, span, a = lanes[left], span[:, left], a[:, :, left]
+            lanes, p, span, a = lanes[left], _some(p, left), span[:, left], a[:, :, left]
         return found
 
     def _newton_step(self, p: Array, span: Array, a: Array, gradient: Array) -> Array:
@@ -166,7 +157,8 @@ class Geodesics:
         apart = np.eye(R).reshape(n, K, R, 1) * size
         moved = (a[:, :, None] + apart).reshape(n, K, R * N)
         wide = np.repeat(span[:, None], R, axis=1).reshape(n, R * N)
-        slopes = self._expand(p, wide, moved).gradient.reshape(R, R, N) - gradient.reshape(R, 1, N)
+        starts = np.repeat(np.broadcast_to(p, span.shape)[:, None], R, axis=1).reshape(n, R * N)
+        slopes = self._expand(starts, wide, moved).gradient.reshape(R, R, N) - gradient.reshape(R, 1, N)
         H = np.nan_to_num(np.moveaxis(slopes / size, -1, 0))
         curvature, Q = np.linalg.eigh((H + H.transpose(0, 2, 1)) / 2)
         curvature = np.abs(curvature)
@@ -187,21 +179,23 @@ class Geodesics:
 
     def _expand(self, p: Array, span: Array, a: Array) -> _Curve:
         n, Q, N = len(p), len(self._s), span.shape[1]
-        x = p[:, None, None] + span[:, None] * self._s[:, None] + np.matmul(self._phi.T, a)
+        x = p[:, None] + span[:, None] * self._s[:, None] + np.matmul(self._phi.T, a)
         v = span[:, None] + np.matmul(self._slope.T, a)
         values = self._tape.run_floats_silenced(list(x), (Q, N))
-        own = len(self._triangle[0])
-        factor = _factored(values[:own], n)
-        m = _solved(factor, v)
-        density = (v * m).sum(axis=0)
+        first, second = self._triangle
+        m = _solved(_factored(values[: len(first)], n), v)
+        density = np.einsum("iqn,iqn->qn", v, m)
         gradient = 2 * np.matmul(self._slope * self._weight, m)
-        twice = np.where(self._triangle[0] == self._triangle[1], 1.0, 2.0)[:, None, None]
-        squares = twice * m[self._triangle[0]] * m[self._triangle[1]]
-        for place, i in enumerate(self._moving, 1):
-            pull = (values[own * place : own * (place + 1)] * squares).sum(axis=0)
+        at = len(first)
+        for i, places in self._slopes:
+            pull = np.zeros((Q, N))
+            for place, slope in zip(places, values[at : at + len(places)], strict=True):
+                j, k = first[place], second[place]
+                pull += slope * m[j] * m[k] * (1.0 if j == k else 2.0)
             gradient[i] -= (self._phi * self._weight) @ pull
+            at += len(places)
         uneven = density.max(axis=0) - density.min(axis=0)
-        return _Curve(self._weight @ density, gradient, uneven, factor, self._full(values[:own, Q // 2]))
+        return _Curve(self._weight @ density, gradient, uneven, m, self._full(values[: len(first), Q // 2]))
 
     def _full(self, lower: Array) -> Array:
         """The symmetric matrices (n, n, ..) of lower triangles."""
@@ -212,10 +206,21 @@ class Geodesics:
         return W
 
 
-def _nothing(a: Array) -> Geodesic:
-    """Not found yet, for lanes of such coefficients."""
-    n, _, N = a.shape
-    return Geodesic(np.full(N, NOT_FOUND), np.zeros(N), np.zeros((n, N)), np.zeros((n, N)), np.zeros_like(a))
+def _settled(curve: _Curve, a: Array) -> Geodesic:
+    """The lanes as if they were done; `a` is one step further, for the next time."""
+    resolved = curve.uneven <= _UNEVEN * curve.energy
+    return Geodesic(np.where(resolved, FOUND, UNRESOLVED), curve.energy, curve.m[:, 0], curve.m[:, -1], a)
+
+
+def _settle(found: Geodesic, lanes: NDArray[np.intp], done: NDArray[np.bool_], own: Geodesic) -> None:
+    """Keeps those of some lanes that are done."""
+    for whole, part in zip(found, own, strict=True):
+        whole[..., lanes[done]] = part[..., done]
+
+
+def _some(p: Array, lanes: NDArray[np.intp] | NDArray[np.bool_]) -> Array:
+    """The plan of some lanes, where it is not that of all."""
+    return p if p.shape[1] == 1 else p[:, lanes]
 
 
 def _lower(W: Matrix) -> list[Expression]:

@@ -227,7 +227,7 @@ class Batch:
         return replace(self, x0=self.x0[lanes], disturbance=self.disturbance.of(lanes))
 
     def beside(self, other: Batch) -> bool:
-        """Whether both can be lanes of one vector: of the same model, plan and times."""
+        """Whether both can be lanes of one vector: of the same model and times."""
         own, its = self.problem, other.problem
-        same = own.model is its.model and own.plan is its.plan and own.horizon == its.horizon
+        same = own.model is its.model and own.horizon == its.horizon
         return same and own.degree == its.degree and np.array_equal(own.times, its.times)

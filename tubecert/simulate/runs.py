@@ -51,9 +51,10 @@ class Runs:
     Shapes: t (K,), x and x' = `slope` (N, K, n), x_plan (K, n), u_plan (K, m), k, u_a, sigma_hat and h (N, K, m),
     xtilde (N, K, n), distance (N, K), the Riemannian d(x*, x). u = u_plan + k + u_a is what acts. A quantity that a
     loop does not have is 0. `least` and `greatest` (N, m) are of every input, over all steps. After a lane was stopped
-    its values are nan. `error` (N,) is the largest difference in |S x| to the run with steps twice as long, or an
-    eighth of the one before, an estimate of the error and mostly above it; it is inf for a lane that was stopped.
-    `unresolved` (N,) is the first output time at which that difference exceeds the tolerance, nan where it never does.
+    its values are nan. `error` (N,) is twice the largest difference in |S x| to the run with steps twice as long, or an
+    eighth of the difference before, an estimate of the error and mostly far above it; it is inf for a lane that was
+    stopped. `unresolved` (N,) is the first output time at which that difference exceeds the tolerance, nan where it
+    never does.
     """
 
     t: Array

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.model import TIME
 from tubecert.simulate.problem import LoopProblem
 from tubecert.spec import Knots
+from tubecert.trajectory import Plan
 
 _SAME = 1e-11  # of the horizon: times that differ by less are one
 _FEWEST_STEPS = 64
@@ -29,9 +31,9 @@ class Reference(NamedTuple):
 class Grid(NamedTuple):
     """Steps of a level: `start` and `length` (S + 1,) in s, the last of length 0.
 
-    `outputs` (K,) are the numbers of the steps that start at the output times. `plan`: x* (S + 1, 3, n), f(x*) +
-    B(x*)u* (S + 1, 3, n) and u* (S + 1, 3, m) at start, middle and end of every step; where u* jumps, the side that
-    belongs to the step.
+    `outputs` (K,) are the numbers of the steps that start at the output times. `plan`: x* (S + 1, 3, n, L), f(x*) +
+    B(x*)u* (S + 1, 3, n, L) and u* (S + 1, 3, m, L) of L plans at start, middle and end of every step; where u* jumps,
+    the side that belongs to the step.
     """
 
     level: int
@@ -41,10 +43,10 @@ class Grid(NamedTuple):
     plan: Reference
 
 
-def corners(problem: LoopProblem) -> Array:
+def corners(problem: LoopProblem, plans: Sequence[Plan]) -> Array:
     """Times (C,) that must be ends of steps."""
     end = problem.horizon
-    kinks = np.zeros(0) if problem.plan.knots is None else _corners_of(problem.plan.knots)
+    kinks = np.concatenate([np.zeros(0), *(_corners_of(plan.knots) for plan in plans if plan.knots)])
     every = np.unique(np.minimum(np.concatenate([[0.0, end], problem.times, kinks[kinks < end]]), end))
     t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
     t[-1] = end
@@ -73,26 +75,28 @@ def nearest(t: Array, wanted: Array) -> Array:
     return np.asarray(right - (wanted - t[right - 1] < t[right] - wanted))
 
 
-def steps(problem: LoopProblem, level: int) -> Grid:
-    """The steps of a level, each level with twice as many as the one before."""
-    t = corners(problem)
+def steps(problem: LoopProblem, level: int, plans: Sequence[Plan] = ()) -> Grid:
+    """The steps of a level, each level with twice as many as the one before; of the problem's plan, or of several."""
+    plans = plans or (problem.plan,)
+    t = corners(problem, plans)
     spans = np.diff(t)
     counts = np.maximum(1, np.ceil(spans / problem.horizon * _FEWEST_STEPS)).astype(np.int64) * 2**level
     first = np.concatenate([[0], np.cumsum(counts)])
     length = np.repeat(spans / counts, counts)
     start = np.repeat(t[:-1], counts) + (np.arange(first[-1]) - np.repeat(first[:-1], counts)) * length
+    courses = [_course(problem, plan, start, length) for plan in plans]
     return Grid(
         level=level,
         start=np.append(start, problem.horizon),
         length=np.append(length, 0.0),
         outputs=first[nearest(t, problem.times)],
-        plan=_course(problem, start, length),
+        plan=Reference(*(np.stack(part, axis=-1) for part in zip(*courses, strict=True))),
     )
 
 
-def _course(problem: LoopProblem, start: Array, length: Array) -> Reference:
-    """The plan at start, middle and end of every step (S,), and after the last one."""
-    plan, model = problem.plan, problem.model
+def _course(problem: LoopProblem, plan: Plan, start: Array, length: Array) -> Reference:
+    """A plan at start, middle and end of every step (S,), and after the last one."""
+    model = problem.model
     S = len(start)
     t = np.minimum(start[:, None] + length[:, None] * np.array([0.0, 0.5, 1.0]), problem.horizon)
     span = None
