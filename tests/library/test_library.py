@@ -430,7 +430,7 @@ def test_a_page_is_that_of_the_command(tmp_path, monkeypatch):
 def test_a_simulation(tmp_path):
     told = []
     found = tc.simulate(certified(), runs=2, controllers="ccm,l1", progress=told.append)
-    assert {step.of for step in told if step.phase is tc.Phase.SIMULATION} == {2, 256}  # ccm is not attacked
+    assert {step.of for step in told if step.phase is tc.Phase.SIMULATION} == {2, 1024}  # ccm is not attacked
     assert (found.outcome, found.falsified) == ("not falsified", False)
     assert found.controllers == ("ccm", "l1")
     assert found.run("l1").x.shape[0] == 1

@@ -121,7 +121,7 @@ def test_what_is_no_result_and_what_is_missing_is_told(error, interrupted, outco
     }
     made = runs_by_hand(t, still, distance, **doubt)
     drawn = Drawn(loop=own, runs=made, comparison=compare(where, made, replace(own.promise, decay=None)))
-    kept = {"uncertainty": SPECIFIED, "attacks": (), "count": 0, "seed": 0, "interrupted": interrupted}
+    kept = {"uncertainty": SPECIFIED, "attacks": (), "seed": 0, "interrupted": interrupted}
     data, words = words_of(Campaign(setting=where, drawn=(drawn,), **kept))
     assert data["outcome"] == outcome
     assert data["loops"][0]["no_result"] == (outcome == "no result")

@@ -77,7 +77,6 @@ class Campaign:
     uncertainty: str
     drawn: tuple[Drawn, ...]
     attacks: tuple[Attack, ...]
-    count: int
     seed: int
     interrupted: bool
     members: MembersData | None = None
@@ -125,7 +124,6 @@ def simulate(
         uncertainty=SPECIFIED if replay is None else RANDOM.format(run=replay, seed=seed),
         drawn=tuple(drawn),
         attacks=tuple(attacks),
-        count=count,
         seed=seed,
         interrupted=not complete,
     )
