@@ -1,16 +1,20 @@
 """Writes docs/reference/: python docs/generate.py
 
-From the JSON Schemas, the pages of `explain` and what `verify` said of the published metrics.
+From the table of keys (`tubecert.spec.keys`), the JSON Schemas, the pages of `explain` and what `verify` said of the
+published metrics. The schemas of specifications and of certificates of sampled loops are written as well.
 """
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
 from decimal import ROUND_CEILING, Context
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, get_args
 
@@ -19,9 +23,13 @@ sys.path.insert(0, str(ROOT))
 
 from tubecert import records  # noqa: E402
 from tubecert.certificate.effective import Effective  # noqa: E402
+from tubecert.expression import MAX_LENGTH, MAX_NAME_LENGTH  # noqa: E402
 from tubecert.records import refer  # noqa: E402
 from tubecert.report import pages  # noqa: E402
 from tubecert.sampled_loop.record import FORMAT, HexMatrix, Notes, Result  # noqa: E402
+from tubecert.spec.keys import LIST, NAME, NUMBER, PAIR, Section  # noqa: E402
+from tubecert.spec.load import FILE  # noqa: E402
+from tubecert.spec.plan import PLANS  # noqa: E402
 
 REFERENCE = ROOT / "docs" / "reference"
 _NOTE = "<!-- written by docs/generate.py; do not edit -->"
@@ -32,6 +40,40 @@ _KINDS = {
     "number": "number",
     "integer": "whole number",
 }
+
+
+_VALUES = {
+    "start_by_state": {
+        "description": "A number or a range [low, high] for some states.",
+        "type": "object",
+        "propertyNames": NAME,
+        "additionalProperties": {"anyOf": [NUMBER, PAIR]},
+        "examples": [{"x": [-0.1, 0.1]}],
+    },
+    "number": {
+        "description": "An exact rational number: 0.1 is one tenth; a text may be a quotient or use parameters "
+        '("1/3", "m*g/2"), pi or degrees ("-pi/4", "30 deg").',
+        "type": ["number", "string"],
+        "minLength": 1,
+    },
+    "expression": {
+        "description": "An expression: + - * / **, sin cos tan asin acos atan sinh cosh tanh exp log sqrt, pi, "
+        "numbers, names.",
+        "type": ["number", "string"],
+        "minLength": 1,
+        "maxLength": MAX_LENGTH,
+    },
+    "name": {
+        "type": "string",
+        "pattern": f"^[A-Za-z][A-Za-z0-9_]{{0,{MAX_NAME_LENGTH - 1}}}$",
+        "description": "A letter, then letters, digits and _; unique, and neither t nor a function.",
+    },
+    "matrix": {
+        "description": "A square matrix by rows, or a number that stands for a multiple of the identity.",
+        "anyOf": [NUMBER, {"type": "array", "minItems": 1, "items": LIST}],
+    },
+}
+"""Forms of values that users of the schema of specifications know by name."""
 
 
 class Reference:
@@ -322,6 +364,70 @@ def sampled_loop() -> dict[str, Any]:
     }
 
 
+def specification() -> dict[str, Any]:
+    """The schema of specifications, from the table of keys and the words below them."""
+    own = _section_form(FILE)
+    kinds = {f"trajectory_{kind}": _section_form(section) for kind, section in PLANS.items()}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "urn:tubecert:spec:1",
+        "title": "tubecert specification",
+        **own,
+        "$defs": {**_VALUES, **kinds},
+    }
+
+
+def _section_form(section: Section) -> dict[str, Any]:
+    words = {} if section.make is None else _words(section.make)
+    properties = {}
+    for name, key in section.keys.items():
+        said = key.words or words.get((key.into or name).rpartition(".")[2]) or words.get(name)
+        properties[name] = ({"description": said} if said else {}) | _key_form(key.kind.schema) | key.beside
+    needed = {"required": list(section.needed)} if section.needed else {}
+    described = {"type": "object", "description": section.words, "properties": properties}
+    return described | needed | {"additionalProperties": False, **section.form}
+
+
+def _key_form(form: Any) -> Any:
+    """A schema with those of its sections in their places."""
+    match form:
+        case {"section": section}:
+            return _section_form(section)
+        case {"plans": plans}:
+            return _union(plans)
+        case dict():
+            return {key: _key_form(value) for key, value in form.items()}
+        case list():
+            return [_key_form(each) for each in form]
+    return form
+
+
+def _union(plans: Mapping[str, Section]) -> dict[str, Any]:
+    branches = [
+        {
+            "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
+            "then": {"$ref": f"#/$defs/trajectory_{kind}"},
+        }
+        for kind in plans
+    ]
+    kind = {"enum": list(plans), "description": "What kind of plan."}
+    return {"type": "object", "required": ["kind"], "properties": {"kind": kind}, "allOf": branches}
+
+
+def _words(make: type) -> dict[str, str]:
+    """What stands below each key in the source of a class."""
+    [own] = ast.parse(inspect.getsource(make)).body
+    found = {}
+    for line, below in pairwise(own.body):
+        match line, below:
+            case (
+                ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
+                found[name] = " ".join(text.split())
+    return found
+
+
 def _described(form: dict[str, Any], kind: Any) -> dict[str, Any]:
     """A record's schema, closed, with the sentence of its words that names each key, or else all of them."""
     words = " ".join((kind.__doc__ or "").split())
@@ -379,8 +485,9 @@ def everything() -> dict[str, str]:
 def main() -> None:
     """Write the pages."""
     REFERENCE.mkdir(exist_ok=True)
-    text = json.dumps(sampled_loop(), indent=2, ensure_ascii=False) + "\n"
-    (ROOT / "tubecert" / "schemas" / "sampled-loop.schema.json").write_text(text, encoding="utf-8")
+    for short, schema in (("sampled-loop", sampled_loop()), ("spec", specification())):
+        text = json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+        (ROOT / "tubecert" / "schemas" / f"{short}.schema.json").write_text(text, encoding="utf-8")
     for name, text in everything().items():
         (REFERENCE / name).write_text(text, encoding="utf-8")
 

@@ -6,7 +6,7 @@ import pytest
 from tubecert.simulate.flows import Fast
 from tubecert.simulate.loops import CONTROLLERS, DESIGNS
 from tubecert.simulate.problem import LoopGains
-from tubecert.spec.simulation import CONTROLLERS as NAMES
+from tubecert.spec.scene import CONTROLLERS as NAMES
 
 GAINS = LoopGains(bandwidth=7.0, projection_radius=100.0, predictor_gain=3.0, adaptation_rate=11.0)
 B = np.array([[1.0, 0.5], [-0.25, 2.0]])

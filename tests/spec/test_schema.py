@@ -1,6 +1,5 @@
 """The JSON Schemas: they say what the readers and the writer say, and an editor that has only them agrees."""
 
-import ast
 import copy
 import json
 import re
@@ -19,10 +18,9 @@ from systems import SMALL
 import tubecert
 from tubecert import certificate, spec
 from tubecert.certificate.result import Certificate
-from tubecert.errors import TubecertError
-from tubecert.spec.load import load, load_question, load_system, load_text
-from tubecert.spec.metric_file import with_metric
-from tubecert.spec.reader import Field
+from tubecert.spec.keys import Section
+from tubecert.spec.load import FILE, load_question, load_text
+from tubecert.spec.plan import PLANS
 
 PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
@@ -104,66 +102,6 @@ def test_what_the_reader_says_of_keys_and_kinds_the_schema_says_too(path):
         assert errors("spec", as_text(path))
 
 
-class Asked:
-    """Every question that the readers ask of a mapping: where, in which line, and for which keys."""
-
-    def __init__(self) -> None:
-        self.known: dict[tuple[str, str], set[str]] = {}
-        self.required: dict[tuple[str, str], set[str]] = {}
-        self.lines: set[tuple[str, int]] = set()
-
-    def record(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        real = Field.mapping
-
-        def mapping(field: Field, *, required=(), optional=(), reserved=()):
-            caller = sys._getframe(1)
-            self.lines.add((Path(caller.f_code.co_filename).name, caller.f_lineno))
-            kind = ""
-            if field.path == "trajectory":
-                kind = next(node.text for key, node in field.node.pairs if key.text == "kind")
-            by_name = caller.f_code.co_name in ("read_box", "_combined", "_named_ends")  # states or inputs
-            if Path(caller.f_code.co_filename).name != "metric_file.py" and not by_name:
-                path = re.sub(r"^uncertainty\.bounds\.\w+", "uncertainty.bounds", field.path)
-                self.known.setdefault((path, kind), set()).update(required, optional)
-                self.required.setdefault((path, kind), set()).update(required)
-            return real(field, required=required, optional=optional, reserved=reserved)
-
-        monkeypatch.setattr(Field, "mapping", mapping)
-
-
-def subschema(path: str, kind: str) -> dict[str, Any]:
-    """The schema of the mapping at a dotted path."""
-    schema = SCHEMAS["spec"]
-    if path == "trajectory":
-        return schema["$defs"][f"trajectory_{kind}"]
-    for key in filter(None, re.split(r"\.|\[\d+\]", path)):
-        schema = schema.get("items", schema)
-        while "$ref" in schema:
-            schema = SCHEMAS["spec"]["$defs"][schema["$ref"].rsplit("/", 1)[1]]
-        schema = schema.get("items", schema)
-        named = schema.get("properties", {})
-        schema = named.get(key) or schema["additionalProperties"]  # tables have names of their own
-        choices = [item for item in schema.get("anyOf", ()) if "properties" in item]
-        schema = choices[0] if choices and "properties" not in schema else schema
-    while "$ref" in schema:
-        schema = SCHEMAS["spec"]["$defs"][schema["$ref"].rsplit("/", 1)[1]]
-    return schema.get("items", schema) if "properties" not in schema else schema
-
-
-def sites() -> set[tuple[str, int, int]]:
-    """Where the readers of the specification call `.mapping(`."""
-    found = set()
-    for path in sorted((PACKAGE / "spec").glob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if (
-                isinstance(node, ast.Call)
-                and isinstance(node.func, ast.Attribute)
-                and node.func.attr == "mapping"
-            ):
-                found.add((path.name, node.lineno, node.end_lineno or node.lineno))
-    return found
-
-
 EVERYTHING = """
 tubecert: 1
 name: everything
@@ -180,63 +118,43 @@ expect: {verdict: certified, half_widths: {x: [0, 1]}}
 """
 
 
+def sections(form: Any) -> Iterator[Section]:
+    """The sections that a part of the table has within it."""
+    if isinstance(form, Section):
+        yield form
+        for key in form.keys.values():
+            yield from sections(key.kind.schema)
+    else:
+        for each in form.values() if isinstance(form, dict) else form if isinstance(form, list) else ():
+            yield from sections(each)
+
+
 @pytest.mark.slow
-def test_the_readers_know_no_key_that_the_schema_does_not(monkeypatch, tmp_path):
-    """Every call of `.mapping(` is met, and what it asks for is what the schema says at that place."""
-    asked = Asked()
-    asked.record(monkeypatch)
-    for path in [*GOOD, *BAD]:
-        try:
-            load(str(path))
-        except (TubecertError, StopIteration):
-            continue
-    full = load_text(EVERYTHING)
-    metric = tmp_path / "metric.json"
-    metric.write_text(json.dumps({"format": "tubecert-metric/1", "rate": 1, "dual_metric": [[1]]}))
-    with_metric(full, str(metric))
-    load_system(str(GOOD[0]))
-    met = [{(name, each) for each in range(first, last + 1)} & asked.lines for name, first, last in sites()]
-    assert all(met), "a section that no example file of tests/specs/ok has"
-    # their keys are states or inputs
-    box = {"tube.half_widths", "trajectory.x", "trajectory.u", "limits", "hardware.noise", "hardware.limits"}
-    box |= {"trajectory.input_rate", "expect.half_widths"}
-    for (path, kind), known in asked.known.items():
-        if path in box or path.startswith("uncertainty.bounds."):  # bounds of an input
-            continue
-        schema = subschema(path, kind)
-        named = path == "uncertainty.bounds"  # beside its own keys, those of the inputs
-        assert set(schema["properties"]) == (known & {"h", "h_x", "h_t"} if named else known), (path, kind)
-        depends = "anyOf" in schema or "if" in schema or path == "uncertainty.bounds"  # on other keys
-        if not depends:
-            assert set(schema.get("required", ())) == asked.required[(path, kind)], (path, kind)
-        assert schema["additionalProperties"] is False or path == "uncertainty.bounds"
+def test_every_section_of_the_table_is_read(monkeypatch):
+    """From the table, and from nothing else: what the schema has is asked of some file, with its keys."""
+    asked = []
+    real = Section.entries
+
+    def entries(section, *arguments):
+        asked.append(section.keys.keys())
+        return real(section, *arguments)
+
+    monkeypatch.setattr(Section, "entries", entries)
+    for path in GOOD:
+        load_question(str(path))
+    load_text(EVERYTHING)
+    told = list(sections(FILE))
+    assert len(told) > 20
+    assert [section.words for section in told if section.keys.keys() not in asked] == []
 
 
-def test_the_choices_are_those_of_the_readers():
-    from tubecert.letters import ADAPTIVE, ALL, NAMES, words_of
-    from tubecert.spec.plan import KINDS
-    from tubecert.spec.settings import METRICS, RANGES, VERDICTS, WIDTHS
-    from tubecert.spec.simulation import CONTROLLERS
-    from tubecert.spec.synthesis import OBJECTIVES, ROUTES, SOLVERS
+def test_the_choices_are_those_of_certificates():
+    from tubecert.letters import NAMES
 
-    properties = SCHEMAS["spec"]["properties"]
-    assert properties["trajectory"]["properties"]["kind"]["enum"] == list(KINDS)
-    assert properties["expect"]["properties"]["verdict"]["enum"] == list(VERDICTS)
-    assert properties["expect"]["properties"]["metric"]["enum"] == list(METRICS.values())
-    assert set(properties["expect"]["properties"]) == {"verdict", "metric", WIDTHS, *RANGES}
-    decides = properties["conditions"]["properties"]["decides"]["enum"]
-    assert set(map(str, decides)) == {*words_of(), ALL}
     result = SCHEMAS["certificate"]["properties"]["result"]["properties"]
     assert result["decided_by"]["items"]["enum"] == [name.key for name in NAMES]
     assert {name.key for name in NAMES} <= set(result)
-    assert result["plan"]["properties"]["kind"]["enum"] == list(KINDS)
-    simulation = properties["simulation"]["properties"]
-    assert simulation["controllers"]["items"]["enum"] == list(CONTROLLERS)
-    assert set(map(str, simulation["gains"]["enum"])) == set(words_of(ADAPTIVE))
-    synthesis = properties["metric"]["properties"]["synthesise"]["properties"]
-    for key, choices in (("objective", OBJECTIVES), ("route", ROUTES)):
-        assert synthesis[key]["enum"] == list(choices)
-    assert synthesis["solver"]["anyOf"][0]["enum"] == list(SOLVERS)
+    assert result["plan"]["properties"]["kind"]["enum"] == list(PLANS)
 
 
 @pytest.mark.parametrize("path", [*CONFIGS], ids=lambda path: path.stem)
@@ -315,6 +233,7 @@ def test_the_reference_is_what_the_schemas_say():
     import generate
 
     assert generate.sampled_loop() == SCHEMAS["sampled-loop"], "run python docs/generate.py"
+    assert generate.specification() == SCHEMAS["spec"], "run python docs/generate.py"
     for name, text in generate.everything().items():
         assert (ROOT / "docs" / "reference" / name).read_text("utf-8") == text, "run python docs/generate.py"
     page = generate.published().partition("| metric |")[0]

@@ -16,7 +16,7 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding, Location
 from tubecert.pipeline.verification import Verified
 from tubecert.spec import Spec
-from tubecert.spec.settings import METRICS, WIDTHS
+from tubecert.spec.tube import METRICS, WIDTHS
 from tubecert.verdict import Verdict
 from tubecert.words.advice import advice
 from tubecert.words.claims import input_title, message, title

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from tubecert.checking.expectations import Claim, Outcome
 from tubecert.sampled_loop.record import Certificate, Result
-from tubecert.spec.settings import WIDTHS
+from tubecert.spec.tube import WIDTHS
 from tubecert.words.sampled_loop import lacking
 
 

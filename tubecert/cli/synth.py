@@ -16,7 +16,7 @@ from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode
 from tubecert.library.asked import SynthesisNumbers, Wishes, one_of, synthesis_numbers, wanted_of
 from tubecert.report.terminal import Terminal
-from tubecert.spec.synthesis import COORDINATES
+from tubecert.spec.metric import COORDINATES
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -16,7 +16,7 @@ from tubecert.expression import suggestion
 from tubecert.findings import Finding, NamedPlace
 from tubecert.library.numbers import Numbers
 from tubecert.spec import Setting, Spec, Synthesis
-from tubecert.spec.synthesis import MAX_DEGREE, solver_name
+from tubecert.spec.metric import MAX_DEGREE, solver_name
 
 if TYPE_CHECKING:
     from tubecert.stages.options import Options

@@ -33,7 +33,7 @@ from tubecert.library.specification import File, Specifiable, Specification, spe
 from tubecert.progress import Progress
 from tubecert.report.progress import timed
 from tubecert.spec import Spec, metric_file
-from tubecert.spec.synthesis import COORDINATES, OBJECTIVES, ROUTES
+from tubecert.spec.metric import COORDINATES, OBJECTIVES, ROUTES
 from tubecert.verdict import Verdict
 from tubecert.words.claims import sentence
 

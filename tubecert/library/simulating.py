@@ -200,7 +200,7 @@ def simulation_numbers(given: Mapping[str, str | None], named: Named) -> Simulat
 
 def controllers_of(given: str | Sequence[str] | None, named: Named) -> tuple[str, ...]:
     """The loops that are asked for; raises `SpecError` for a name that is none."""
-    from tubecert.spec.simulation import CONTROLLERS
+    from tubecert.spec.scene import CONTROLLERS
 
     parts = given.split(",") if isinstance(given, str) else given or ()
     words = tuple(dict.fromkeys(word.strip() for word in parts if word.strip()))

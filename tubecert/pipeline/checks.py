@@ -9,8 +9,8 @@ from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec, Synthesis
+from tubecert.spec.load import NO_SEARCH
 from tubecert.spec.metric_file import of_no_metric
-from tubecert.spec.system import NO_SEARCH
 from tubecert.stages.time import time_of
 from tubecert.verdict import Verdict
 

@@ -7,13 +7,15 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `source` | reads the text within limits; lines and columns |
 | `document` | YAML events -> a tree that knows where each node stands |
 | `reader` | a cursor that answers with values or findings |
-| `names`, `system`, `plan`, `settings`, `obstacles`, `hardware`, `simulation`, `synthesis` | the sections of the file |
+| `keys` | the vocabulary of the table of keys: kinds, keys, sections |
+| `system`, `plan`, `start`, `metric`, `tube`, `machine`, `scene` | the table: sections of the file by chapters |
+| `names` | the names that expressions may use |
 | `table` | a plan file (CSV): text -> exact knots |
 | `algebra` | exact checks: definiteness, symmetry, rank |
 | `override` | keys that the command line sets, put into the tree |
-| `load` | puts the sections together |
+| `load` | the file as a section, and what holds between sections |
 | `canonical` | the effective specification as plain data |
-| `codes`, `types` | finding codes; the values of a specification |
+| `codes`, `types`, `values` | finding codes; a specification and what it is made of |
 """
 
 from tubecert.spec.canonical import canonical
@@ -21,16 +23,9 @@ from tubecert.spec.codes import CODES
 from tubecert.spec.load import load, load_question, load_text
 from tubecert.spec.override import Setting
 from tubecert.spec.types import (
-    Adaptation,
-    Arithmetic,
-    Bounds,
-    Disturbance,
-    Expectation,
     Hardware,
     Interpolation,
     Knots,
-    Matrix,
-    Metric,
     Obstacle,
     Simulation,
     Spec,
@@ -38,40 +33,10 @@ from tubecert.spec.types import (
     Table,
     Task,
     Term,
-    TermMatrix,
-    Trajectory,
-    Tube,
-    Uncertainty,
     Vector,
 )
 
 __all__ = [
-    "CODES",
-    "Adaptation",
-    "Arithmetic",
-    "Bounds",
-    "Disturbance",
-    "Expectation",
-    "Hardware",
-    "Interpolation",
-    "Knots",
-    "Matrix",
-    "Metric",
-    "Obstacle",
-    "Setting",
-    "Simulation",
-    "Spec",
-    "Synthesis",
-    "Table",
-    "Task",
-    "Term",
-    "TermMatrix",
-    "Trajectory",
-    "Tube",
-    "Uncertainty",
-    "Vector",
-    "canonical",
-    "load",
-    "load_question",
-    "load_text",
-]
+    "CODES", "Hardware", "Interpolation", "Knots", "Obstacle", "Setting", "Simulation", "Spec", "Synthesis",
+    "Table", "Task", "Term", "Vector", "canonical", "load", "load_question", "load_text",
+]  # fmt: skip

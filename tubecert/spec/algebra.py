@@ -9,7 +9,7 @@ from functools import cache
 from itertools import combinations
 
 from tubecert.expression import ZERO, Expression, free_symbols, is_zero, topological
-from tubecert.spec.types import Matrix
+from tubecert.spec.values import Matrix
 
 _POINTS = 3
 _LARGEST_SYMBOLIC = 4  # columns up to which det(B^T B) is expanded

@@ -163,7 +163,7 @@ GONE: Final[Mapping[str, str]] = {
 """Words that there once were, or that belong elsewhere, and what to do instead."""
 
 NO_NUMBER: Final[Mapping[str, str]] = {
-    "largest": "no machine and no disturbance is searched for now: write a number",
+    "largest": "no machine and no disturbance is searched for now: write a number"
 }
 """The same where a number belongs."""
 

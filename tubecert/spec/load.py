@@ -2,97 +2,129 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import Final, Literal, TypeAlias
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, Literal, TypeAlias
 
 from tubecert.errors import SpecError
+from tubecert.expression import Expression, free_symbols
+from tubecert.expression.waves import frequencies
 from tubecert.findings import Finding, Location, capped
-from tubecert.spec import codes
-from tubecert.spec.boxes import read_box, read_units
+from tubecert.spec import codes, keys
 from tubecert.spec.document import MappingNode, Scalar, compose
-from tubecert.spec.hardware import (
+from tubecert.spec.keys import AUTO, Kind, entry, form, section
+from tubecert.spec.machine import (
+    CONTROLLER,
+    HARDWARE,
     IN_CONTINUOUS_TIME,
+    LIMITS,
     check_machine,
     limits_of,
-    read_controller,
-    read_disturbance,
     read_hardware,
 )
-from tubecert.spec.limits import read_limits
-from tubecert.spec.names import Names, read_names
-from tubecert.spec.obstacles import read_obstacles
+from tubecert.spec.metric import METRIC, WANTED, Metric, Synthesis, read_metric
+from tubecert.spec.names import TIME, Names, read_names
 from tubecert.spec.outputs import with_outputs
 from tubecert.spec.override import Setting, put
-from tubecert.spec.plan import (
-    at_rest,
-    completed,
-    no_uncertainty,
-    read_initial_state,
-    read_trajectory,
+from tubecert.spec.plan import PLANS, at_rest, completed, read_trajectory, trajectory_data
+from tubecert.spec.reader import Field, Reader, is_of_another_kind, root_field
+from tubecert.spec.scene import OBSTACLE, SIMULATION, obstacles_data, read_obstacles, read_simulation
+from tubecert.spec.source import Source, check_limits, read_source
+from tubecert.spec.start import INITIAL_STATE, initial_state_data, read_initial_state
+from tubecert.spec.system import (
+    DISTURBANCE,
+    SAFE_SET,
+    SYSTEM,
+    UNCERTAINTY,
+    is_uncertain,
+    known_of,
+    read_disturbance,
+    read_dynamics,
+    read_uncertainty,
+    read_units,
 )
-from tubecert.spec.reader import Field, Reader, root_field
-from tubecert.spec.settings import (
-    read_adaptation,
-    read_decides,
+from tubecert.spec.tube import (
+    ADAPTATION,
+    CONDITIONS,
+    EXPECT,
+    SLUG,
+    TUBE,
+    decides_data,
+    expected_data,
     read_expectation,
     read_name,
     read_tube,
+    tube_data,
 )
-from tubecert.spec.simulation import read_simulation
-from tubecert.spec.source import Source, check_limits, read_source
-from tubecert.spec.system import (
-    NO_SEARCH,
-    check_moving,
-    is_uncertain,
-    known_of,
-    read_dynamics,
-    read_metric,
-    read_uncertainty,
-    returns,
-    wanted_metric,
-)
-from tubecert.spec.types import (
-    Metric,
-    Places,
-    Spec,
-    Synthesis,
-    Term,
-    TermMatrix,
-    Trajectory,
-)
+from tubecert.spec.types import Places, Spec, Term, Trajectory
 
 VERSION: Final = 1
 
 _SYSTEM = ("tubecert", "name", "system", "safe_set")
 _LOOP = ("uncertainty", "trajectory")
-_FORMATS = (
-    (
-        "tubecert-certificate/",
-        "a certificate",
-        "name the specification (YAML) that it was made from; simulate takes both: simulate SPEC --certificate FILE",
-    ),
-    (
-        "tubecert-metric/",
-        "a metric file",
-        "give it beside a specification: tubecert certify SPEC --metric FILE",
-    ),
-)
 _METRIC = ("metric", "expect")  # all that a question about a metric alone has beside its system
-_OPTIONAL = (
-    "initial_state",
-    "tube",
-    "adaptation",
-    "conditions",
-    "obstacles",
-    "limits",
-    "simulation",
-    "hardware",
-    "controller",
-    "disturbance",
+_LONG: Final = 10**12  # s, or that many times pi
+_BOTH: Final = "simulate takes both: simulate SPEC --certificate FILE"
+_CERTIFICATE: Final = f"name the specification (YAML) that it was made from; {_BOTH}"
+_METRIC_FILE: Final = "give it beside a specification: tubecert certify SPEC --metric FILE"
+_OTHERS: Final = {
+    "format: tubecert-certificate/": ("this is a certificate, not a specification", _CERTIFICATE),
+    "format: tubecert-metric/": ("this is a metric file, not a specification", _METRIC_FILE),
+}
+NO_SEARCH: Final = (
+    "write metric: {rate: ..., dual_metric: ...}, or --metric FILE; one that synth finds for f with t replaced by "
+    "a number may serve at all times, which certify proves"
 )
 
 Reads: TypeAlias = Literal["whole", "question", "plant", "system"]
+
+
+class File:
+    """A control-affine system with matched uncertainty and its plan, beside a metric and a tube, or beside the hardware
+    of its controller; or, without uncertainty, plan and all that a tube needs, a metric alone (format tubecert: 1).
+    """
+
+    tubecert = entry(form({"enum": [VERSION, str(VERSION)]}), "", needed=True, late=True)
+    """Version of the format."""
+    name = entry(form({"type": ["string", "number"], "pattern": f"^{SLUG}$"}), needed=True, late=True)
+    """Name of the specification; becomes part of file names."""
+    system = entry(keys.inside(SYSTEM), "", needed=True, late=True)
+    safe_set = entry(SAFE_SET, needed=True, example={"p": [-1, 1], "v": [-2, 2]})
+    """The box that the tube must stay in: [lower, upper] for every state. The metric is verified on all of it."""
+    uncertainty = entry(keys.inside(UNCERTAINTY), late=True)
+    trajectory = entry(form({"plans": PLANS}, trajectory_data), late=True)
+    """The plan x*(t), u*(t). It need not satisfy the dynamics exactly: by how much it misses them is bounded, and
+    treated as a disturbance. Needed, but for a question about a metric alone."""
+    initial_state = entry(keys.inside(INITIAL_STATE, write=initial_state_data), "x0", late=True)
+    metric = entry(keys.inside(WANTED, read_metric, METRIC.written))
+    tube = entry(keys.inside(TUBE, read_tube, tube_data), always=True)
+    adaptation = entry(keys.inside(ADAPTATION), always=True)
+    conditions = entry(keys.inside(CONDITIONS, write=decides_data), "decides", late=True, always=True)
+    obstacles = entry(Kind(read_obstacles, {"type": "array", "items": {"section": OBSTACLE}}, obstacles_data))
+    """Obstacles in planes of two states: how far the tube keeps away from each is proven, and decides the verdict."""
+    hardware = entry(keys.inside(HARDWARE, read_hardware))
+    controller = entry(CONTROLLER, late=True, said="auto")
+    """Beside hardware: whether a controller is designed around u*, or nothing is added to it (the plant is stable by
+    itself)."""
+    disturbance = entry(keys.inside(DISTURBANCE, read_disturbance))
+    limits = entry(LIMITS, late=True, example={"u": [-8, 8]})
+    """What the actuators can do: [lower, upper] for some or all inputs. How far each input can go in the loop is
+    proven, and must stay within; this decides the verdict as well."""
+    simulation = entry(keys.inside(SIMULATION), late=True)
+    expect = entry(keys.inside(EXPECT, write=expected_data), late=True)
+
+
+_FORM: Final[dict[str, Any]] = {
+    "if": {
+        "required": ["metric"],
+        "propertyNames": {"enum": [*_SYSTEM, *_METRIC]},
+        "properties": {"metric": {"not": {"required": ["synthesise"]}}},
+    },
+    "else": {
+        "required": ["trajectory"],
+        "anyOf": [{"required": ["uncertainty"]}, {"required": ["hardware"]}],
+    },
+}
+FILE: Final = section(File, **_FORM)
 
 
 def load(path: str, settings: Sequence[Setting] = ()) -> Spec:
@@ -170,44 +202,48 @@ def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None
     if isinstance(root.node, Scalar) and not root.node.text:
         root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
         return None
-    if _is_another_file(root):
+    if is_of_another_kind(root, _OTHERS):
         return None
     alone = _asks_about_metric(root)
     in_part = alone or reads in ("plant", "system")
     loop = _LOOP if root.get("hardware") is None else _LOOP[1:]  # a machine may have no uncertainty
-    entries = root.mapping(
-        required=_SYSTEM if in_part else (*_SYSTEM, *loop), optional=(*_LOOP, *_METRIC, *_OPTIONAL)
-    )
+    entries = FILE.entries(root, _SYSTEM if in_part else (*_SYSTEM, *loop))
     if entries is None:
         return None
     check_machine(entries)
     if "hardware" in entries:
-        entries = {key: field for key, field in entries.items() if key not in IN_CONTINUOUS_TIME}
+        entries = {name: field for name, field in entries.items() if name not in IN_CONTINUOUS_TIME}
     if alone and reads == "whole":
         root.reader.findings.append(_of_metric_alone(root.reader.source.file, entries["metric"].location))
-    lacks = tuple(key for key in loop if key not in entries) if in_part and reads != "system" else ()
+    lacks = tuple(name for name in loop if name not in entries) if in_part and reads != "system" else ()
     if lacks or reads == "system":
         beside = ("metric", "tube") if reads == "plant" else _METRIC
-        entries = {key: entries[key] for key in (*_SYSTEM, *beside) if key in entries}
+        entries = {name: entries[name] for name in (*_SYSTEM, *beside) if name in entries}
     _check_version(entries.get("tubecert"))
     name = read_name(entries["name"]) if "name" in entries else None
-    system = (
-        entries["system"].mapping(
-            required=("states", "inputs", "f", "B"),
-            optional=("parameters", "tables", "definitions", "outputs", "units"),
-        )
-        if "system" in entries
-        else None
-    )
+    system = SYSTEM.entries(entries.get("system"))
     names = read_names(system) if system else None
     if system is None or names is None:
         return None  # without names nothing else can be read
     names = with_outputs(names, system.get("outputs"))
-    spec = _read_named(root.reader, entries, system, name, names, alone=alone)
-    return (
-        None
-        if spec is None
-        else replace(spec, settings=tuple((each.path, each.text) for each in settings), lacks=lacks)
+    found = _read_named(root.reader, entries, system, names, alone=alone)
+    if found is None or name is None:
+        return None
+    return Spec(
+        name=name,
+        path=root.reader.source.file,
+        source=root.reader.source.text,
+        states=names.states,
+        inputs=names.inputs,
+        parameters=names.parameters,
+        ranges=names.ranges,
+        definitions=tuple(name for name, _ in names.definitions),
+        tables=tuple(table for _, table in names.tables),
+        outputs=names.outputs,
+        settings=tuple((each.path, each.text) for each in settings),
+        lacks=lacks,
+        locations=Places(root.reader.places),
+        **found,
     )
 
 
@@ -216,7 +252,7 @@ def _asks_about_metric(root: Field) -> bool:
     found = {key.text: node for key, node in root.node.pairs} if isinstance(root.node, MappingNode) else {}
     own = found.get("metric")
     wanted = isinstance(own, MappingNode) and any(key.text == "synthesise" for key, _ in own.pairs)
-    return own is not None and not wanted and not found.keys() & {*_LOOP, *_OPTIONAL}
+    return own is not None and not wanted and not found.keys() & (FILE.keys.keys() - {*_SYSTEM, *_METRIC})
 
 
 def _of_metric_alone(file: str, place: Location | None) -> Finding:
@@ -230,51 +266,15 @@ def _of_metric_alone(file: str, place: Location | None) -> Finding:
     )
 
 
-def _is_another_file(root: Field) -> bool:
-    """Reports a file of ours of another kind."""
-    for key, node in root.node.pairs if isinstance(root.node, MappingNode) else ():
-        if key.text == "format" and isinstance(node, Scalar):
-            for start, what, help in _FORMATS:
-                if node.text.startswith(start):
-                    root.fail(codes.WRONG_TYPE, f"this is {what}, not a specification", help)
-                    return True
-    return False
-
-
-def _in_the_middle(
-    f: Field | None, B: Field | None, dynamics: tuple[tuple[Term, ...], TermMatrix] | None, names: Names
-) -> tuple[tuple[Term, ...], TermMatrix] | None:
-    """The f and B that the controller knows."""
-    if dynamics is None or f is None or B is None:
-        return None
-    drift = known_of(f, dynamics[0], names)
-    rows = [known_of(B, row, names) for row in dynamics[1]]
-    if drift is None or None in rows:
-        return None
-    return drift, tuple(row for row in rows if row is not None)
-
-
 def _read_named(
-    reader: Reader,
-    entries: dict[str, Field],
-    system: dict[str, Field],
-    name: str | None,
-    names: Names,
-    *,
-    alone: bool,
-) -> Spec | None:
-    f, B = system.get("f"), system.get("B")
-    dynamics = read_dynamics(f, B, names)
-    known = _in_the_middle(f, B, dynamics, names)
-    units = read_units(system.get("units"), names)
-    box = read_box(entries["safe_set"], names) if "safe_set" in entries else None
-    uncertainty = (
-        read_uncertainty(entries["uncertainty"], names, sudden="hardware" in entries)
-        if "uncertainty" in entries
-        else None
-    )
-    if "hardware" in entries and "uncertainty" not in entries:
-        uncertainty = no_uncertainty(entries["hardware"], len(names.inputs))
+    reader: Reader, entries: Mapping[str, Field], system: Mapping[str, Field], names: Names, *, alone: bool
+) -> dict[str, Any] | None:
+    """What the fields of a `Spec` are but those of the whole file; None with a finding."""
+    f, B, machine = system.get("f"), system.get("B"), entries.get("hardware")
+    drift, inputs = read_dynamics(f, B, names)
+    found = FILE.values(entries, names)
+    sound, box, metric = FILE.holds(found, entries), found.get("safe_set"), found.pop("metric", None)
+    uncertainty = read_uncertainty(entries.get("uncertainty"), machine, names)
     trajectory = entries.get("trajectory")
     plan = read_trajectory(trajectory, names) if trajectory else None
     start = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
@@ -283,94 +283,72 @@ def _read_named(
         plan, uncertainty = at_rest(entries["safe_set"], box, len(names.inputs))
         x0 = tuple((low + high) / 2 for low, high in box)
     plan = completed(plan, x0) if plan else None
-    metric, synthesis = _metric(entries.get("metric"), names)
-    tube = read_tube(entries.get("tube"), names)
-    adaptation = read_adaptation(entries.get("adaptation"), names)
+    limits = limits_of(entries.get("limits"), machine)
+    found |= {
+        "f": drift and f and known_of(f, drift, names),
+        "B": [known_of(B, row, names) for row in inputs] if inputs and B else None,
+        "units": read_units(system.get("units"), names),
+        "uncertainty": uncertainty,
+        "trajectory": plan,
+        "x0": x0,
+        "limits": LIMITS.read(limits, names) if limits else (),
+    }
     expect = read_expectation(entries.get("expect"), names, alone=alone)
-    obstacles = read_obstacles(entries.get("obstacles"), names)
-    limits = read_limits(limits_of(entries.get("limits"), entries.get("hardware")), names)
     simulation = read_simulation(entries.get("simulation"), plan, names)
-    hardware = read_hardware(entries.get("hardware"), names)
-    gained = dynamics is not None and is_uncertain(dynamics[1], names)
-    disturbance = read_disturbance(entries.get("disturbance"), names)
-    if f is not None and dynamics is not None and plan is not None:
-        h = () if uncertainty is None or uncertainty.h is None else uncertainty.h
-        waves = (*dynamics[0], *h)
-        check_moving(f, dynamics[0], _beside_moving(plan, synthesis, waves, machine="hardware" in entries))
-    if reader.findings or name is None or dynamics is None or box is None or uncertainty is None:
+    if f is not None and drift is not None and plan is not None:
+        waves = (*drift, *((uncertainty and uncertainty.h) or ()))
+        _check_moving(f, drift, _beside_moving(plan, metric, waves, machine=machine is not None))
+    if reader.findings or not sound or drift is None or inputs is None or None in found.values():
         return None
-    if plan is None or x0 is None or tube is None or adaptation is None:
-        return None
-    if obstacles is None or limits is None or known is None:
-        return None
-    return Spec(
-        name=name,
-        path=reader.source.file,
-        source=reader.source.text,
-        states=names.states,
-        inputs=names.inputs,
-        units=units,
-        parameters=names.parameters,
-        definitions=tuple(name for name, _ in names.definitions),
-        tables=tuple(table for _, table in names.tables),
-        f=known[0],
-        drift=dynamics[0] if names.ranges else (),
-        ranges=names.ranges,
-        B=known[1],
-        gained=dynamics[1] if gained else (),
-        outputs=names.outputs,
-        safe_set=box,
-        uncertainty=uncertainty,
-        trajectory=plan,
-        x0=x0,
-        within=start.within,
-        start_box=start.box,
-        metric=metric,
-        synthesis=synthesis,
-        tube=tube,
-        adaptation=adaptation,
-        decides=read_decides(entries.get("conditions")),
-        expect=expect,
-        obstacles=obstacles,
-        limits=limits,
-        simulation=simulation,
-        hardware=hardware,
-        controller=read_controller(entries.get("controller")),
-        disturbance=disturbance,
-        locations=Places(reader.places),
-    )
+    decides = CONDITIONS.sound(CONDITIONS.entries(entries.get("conditions")), names) or {}
+    return found | {
+        "B": tuple(found["B"]),
+        "drift": drift if names.ranges else (),
+        "gained": inputs if is_uncertain(inputs, names) else (),
+        "within": start.within,
+        "start_box": start.box,
+        "metric": metric if isinstance(metric, Metric) else None,
+        "synthesis": metric if isinstance(metric, Synthesis) else None,
+        "expect": expect,
+        "simulation": simulation,
+        "decides": decides.get("decides"),
+        "controller": CONTROLLER.read(entries["controller"], names) if "controller" in entries else AUTO,
+    }
+
+
+def _check_moving(f: Field, drift: Sequence[Term], beside: Iterator[tuple[bool, str, str]]) -> None:
+    """What is covered where f depends on t; `beside` is what is not, and what to write then."""
+    if TIME in free_symbols(_with_owed(drift)):
+        for found, message, help in beside:
+            if found:
+                f.fail(codes.RANGE, f"f depends on t, {message}", help)
 
 
 def _beside_moving(
-    plan: Trajectory, synthesis: Synthesis | None, waves: Sequence[Term], *, machine: bool
+    plan: Trajectory, metric: Metric | Synthesis | None, waves: Sequence[Term], *, machine: bool
 ) -> Iterator[tuple[bool, str, str]]:
     """What no theorem is stated for where f depends on t, with what to write; `waves` is all that does."""
     if machine:
-        yield (
-            True,
-            "and with hardware it may not",
-            "what is known of t only may stand in h; or leave out hardware",
-        )
+        known = "what is known of t only may stand in h; or leave out hardware"
+        yield True, "and with hardware it may not", known
         return
     lasting = "without a period that can be seen, so a trajectory with a horizon is needed"
     period = "or t in sin, cos and tan only, with frequencies that are rational multiples of each other"
-    yield (
-        plan.horizon is None and not returns(waves),
-        lasting,
-        f"add trajectory.horizon, in seconds; {period}",
-    )
-    yield synthesis is not None, "and metrics are not found for that: give one", NO_SEARCH
+    endless = plan.horizon is None and not _returns(waves)
+    yield endless, lasting, f"add trajectory.horizon, in seconds; {period}"
+    yield isinstance(metric, Synthesis), "and metrics are not found for that: give one", NO_SEARCH
 
 
-def _metric(field: Field | None, names: Names) -> tuple[Metric | None, Synthesis | None]:
-    """A metric, or what is asked for in its place."""
-    if field is None:
-        return None, None
-    before = len(field.reader.findings)
-    wanted = wanted_metric(field, names)
-    if wanted is not None or len(field.reader.findings) > before:
-        return None, wanted
-    return read_metric(field, names), None
+def _returns(terms: Sequence[Term]) -> bool:
+    """Whether a common period of terms, and of what they owe, is to be seen."""
+    found = frequencies(_with_owed(terms), TIME)
+    return found is not None and (found.period is None or found.period[0] < _LONG)
+
+
+def _with_owed(terms: Sequence[Term]) -> list[Expression]:
+    return [
+        each for term in terms for each in (term.expression, *(duty.argument for duty in term.obligations))
+    ]
 
 
 def _check_version(field: Field | None) -> None:

@@ -14,6 +14,7 @@ from tubecert.expression import Expression, Lookup
 from tubecert.findings import capped
 from tubecert.spec import codes
 from tubecert.spec.interpolation import cubic_slopes, monotone_slopes
+from tubecert.spec.keys import PAIR, Section, entry, form
 from tubecert.spec.reader import Field
 from tubecert.spec.sheet import ENOUGH, Cell, Sheet, is_decimal, number, opened, rows
 
@@ -23,20 +24,41 @@ _MADE: Final[Mapping[str, Callable[[Sequence[Fraction], Sequence[Fraction]], tup
     "monotone": monotone_slopes,
     "cubic": cubic_slopes,
 }
-INTERPOLATIONS: Final = (*_MADE, SLOPES)
 
 Row = Sequence[Fraction]
 
 
-def read_lookup(name: str, entry: Field, parameters: Mapping[str, Expression]) -> Lookup | None:
+TABLE: Final = Section(
+    words="A table: a file or points.",
+    keys={
+        "file": entry(
+            form({"type": "string"}),
+            words="A CSV file of two columns x, y (with interpolation: slopes of three), relative to the folder of "
+            "this file; x increases. A first line may name the columns.",
+        ),
+        "points": entry(
+            form({"type": "array", "items": {**PAIR, "maxItems": 3}, "minItems": 2, "maxItems": MOST_KNOTS}),
+            words="The same, written down: [x, y], with interpolation: slopes [x, y, slope].",
+        ),
+        "interpolation": entry(
+            form({"enum": [*_MADE, SLOPES]}),
+            words="How the curve runs between points: monotone keeps rising tables rising (PCHIP), cubic is the spline "
+            "with continuous curvature (not-a-knot), slopes takes those that are given.",
+            said="monotone",
+        ),
+    },
+)
+
+
+def read_lookup(name: str, field: Field, parameters: Mapping[str, Expression]) -> Lookup | None:
     """One table; None if anything is wrong with it, which has been reported."""
-    own = entry.mapping(optional=("file", "points", "interpolation"))
+    own = TABLE.entries(field)
     if own is None:
         return None
-    kind = own["interpolation"].word(INTERPOLATIONS) if "interpolation" in own else "monotone"
+    kind = own["interpolation"].word((*_MADE, SLOPES)) if "interpolation" in own else "monotone"
     if ("file" in own) == ("points" in own):
-        message = f"{entry.path} needs {'either ' if 'file' in own else ''}a file or points"
-        entry.fail(codes.MISSING_KEY, message, "write {file: NAME.csv}, or {points: [[x, y], [x, y]]}")
+        message = f"{field.path} needs {'either ' if 'file' in own else ''}a file or points"
+        field.fail(codes.MISSING_KEY, message, "write {file: NAME.csv}, or {points: [[x, y], [x, y]]}")
         return None
     if kind is None:
         return None

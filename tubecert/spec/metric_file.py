@@ -12,13 +12,12 @@ from typing import Final
 
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
-from tubecert.spec import codes
+from tubecert.spec import codes, metric
 from tubecert.spec.coefficients import is_of_coefficients, metric_text
-from tubecert.spec.document import MappingNode, Scalar, compose
+from tubecert.spec.document import compose
 from tubecert.spec.names import Names
-from tubecert.spec.reader import Field, Reader, root_field
+from tubecert.spec.reader import Field, Reader, is_of_another_kind, root_field
 from tubecert.spec.source import METRIC, Source, check_limits, read_source
-from tubecert.spec.system import metric_of
 from tubecert.spec.types import Metric, Spec
 
 FORMAT: Final = "tubecert-metric/1"
@@ -28,6 +27,10 @@ _REMEDY: Final = (
     "give a metric file: tubecert synth writes one, and certify writes the metric that it synthesises beside "
     "its certificate"
 )
+_OTHERS: Final = {
+    "tubecert: ": ("this is a specification, not a metric file", _REMEDY),
+    "format: tubecert-certificate/": ("this is a certificate, not a metric file", _REMEDY),
+}
 
 
 def with_metric(spec: Spec, path: str, rate: Fraction | None = None) -> Spec:
@@ -69,29 +72,11 @@ def _with(spec: Spec, source: Source) -> Spec:
 
 
 def _read(root: Field, spec: Spec) -> Metric | None:
-    if _is_another_file(root):
+    if is_of_another_kind(root, _OTHERS):
         return None
     entries = root.mapping(required=("format", "rate", "dual_metric"), optional=_REPORTED)
     if entries is None or "format" not in entries or entries["format"].word((FORMAT,)) is None:
         return None
-    return metric_of(
-        entries,
-        Names(states=spec.states, inputs=spec.inputs, parameters=spec.parameters, ranges=spec.ranges),
-    )
-
-
-def _is_another_file(root: Field) -> bool:
-    """Reports a file of ours of another kind: what its keys lack would be beside the point."""
-    pairs = root.node.pairs if isinstance(root.node, MappingNode) else ()
-    for key, node in pairs:
-        if key.text == "tubecert":
-            root.fail(codes.WRONG_TYPE, "this is a specification, not a metric file", _REMEDY)
-            return True
-        if (
-            key.text == "format"
-            and isinstance(node, Scalar)
-            and node.text.startswith("tubecert-certificate/")
-        ):
-            root.fail(codes.WRONG_TYPE, "this is a certificate, not a metric file", _REMEDY)
-            return True
-    return False
+    names = Names(states=spec.states, inputs=spec.inputs, parameters=spec.parameters, ranges=spec.ranges)
+    values = metric.METRIC.sound(entries, names)
+    return None if values is None else Metric(**values)

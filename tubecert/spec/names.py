@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
@@ -29,7 +29,7 @@ from tubecert.spec.lookup import read_lookup
 from tubecert.spec.rates import rates_of_states
 from tubecert.spec.reader import Field
 from tubecert.spec.scope import Scope
-from tubecert.spec.types import Output
+from tubecert.spec.values import Output
 
 TIME: Final = "t"
 MAX_STATES: Final = 32
@@ -267,24 +267,17 @@ def _read_parameters(
     """
     values: dict[str, Expression] = {}
     ranges: dict[str, Interval] = {}
-    if field is None:
-        return values, ranges
-    pairs = field.pairs("of names to numbers") or []
-    later = [key.text for key, _ in pairs]
-    for key, node in pairs:
-        later.remove(key.text)
-        entry = field.child(key, node)
-        name = new_name(key.text, key_field(field, key), "parameter", taken)
+    found = list(new_names(field, "of names to numbers", "parameter", taken))
+    for i, (name, entry, _) in enumerate(found):
+        later = [other for _, _, other in found[i + 1 :]]
         if isinstance(entry.node, ListNode):
             ends = _read_range(entry, values)
             if name is not None:
                 ranges[name] = ends
             continue
         value = None if _is_range(entry) or _is_early(entry, later) else entry.constant(values)
-        if name is not None:
-            values[name] = (
-                ONE if value is None else value
-            )  # the finding stands; users of it are not wrong too
+        if name is not None:  # of a value that is wrong the finding stands; users of it are not wrong too
+            values[name] = ONE if value is None else value
     return values, ranges
 
 
@@ -295,11 +288,9 @@ def _read_range(field: Field, values: Mapping[str, Expression]) -> Interval:
         return Fraction(0), Fraction(1)
     lower, upper = ends[0].number(values, side="below"), ends[1].number(values, side="above")
     if lower is not None and upper is not None and lower >= upper:
-        field.fail(
-            codes.RANGE,
-            f"{field.path}: the lower end must be below the upper end",
-            "write [lower, upper], or one number if it is known",
-        )
+        message = f"{field.path}: the lower end must be below the upper end"
+        help = "write [lower, upper], or one number if it is known"
+        field.fail(codes.RANGE, message, help)
     return (Fraction(0), Fraction(1)) if lower is None or upper is None else (lower, upper)
 
 
@@ -337,10 +328,8 @@ def _rises(first: str, second: str) -> bool:
 
 def _with_tables(names: Names, field: Field | None, taken: dict[str, str]) -> Names:
     """Tables by name; one that cannot be read stands as 1 everywhere."""
-    for key, node in (field.pairs("of names to tables") or []) if field is not None else ():
-        assert field is not None
-        name = new_name(key.text, key_field(field, key), "table", taken)
-        found = read_lookup(key.text, field.child(key, node), names.values)
+    for name, entry, written in new_names(field, "of names to tables", "table", taken):
+        found = read_lookup(written, entry, names.values)
         if name is not None:
             names = replace(names, tables=(*names.tables, (name, found or UNKNOWN)))
     return names
@@ -348,14 +337,9 @@ def _with_tables(names: Names, field: Field | None, taken: dict[str, str]) -> Na
 
 def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) -> Names:
     """Definitions in the order of the file; each may use those before it. One that cannot be read stands as 1."""
-    if field is None:
-        return names
-    pairs = field.pairs("of names to expressions") or []
-    later = [key.text for key, _ in pairs]
-    for key, node in pairs:
-        later.remove(key.text)
-        entry = field.child(key, node)
-        name = new_name(key.text, key_field(field, key), "definition", taken)
+    found = list(new_names(field, "of names to expressions", "definition", taken))
+    for i, (name, entry, _) in enumerate(found):
+        later = [other for _, _, other in found[i + 1 :]]
         scope = names.of_definition()
         refused = {
             word: f"{word} is defined further down; a definition may use those above it" for word in later
@@ -371,7 +355,15 @@ def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) 
     return names
 
 
+def new_names(
+    field: Field | None, purpose: str, what: str, taken: dict[str, str], shown: str = "NAME: ..."
+) -> Iterator[tuple[str | None, Field, str]]:
+    """The names that a mapping gives, None for those that may not be used, with the values and what is written."""
+    for key, node in (field.pairs(purpose, shown) or ()) if field else ():
+        assert field is not None
+        yield new_name(key.text, key_field(field, key), what, taken), field.child(key, node), key.text
+
+
 def key_field(field: Field, key: Scalar) -> Field:
-    """The key itself, to point at."""
     """A key, to report about it."""
     return Field(reader=field.reader, path=f"{field.path}.{key.text[:60]}", node=key)

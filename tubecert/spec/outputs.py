@@ -7,28 +7,23 @@ from fractions import Fraction
 
 from tubecert.expression import ZERO, derivatives, substitute
 from tubecert.spec import codes
-from tubecert.spec.names import Names, key_field, new_name
+from tubecert.spec.names import Names, new_names
 from tubecert.spec.reader import Field
-from tubecert.spec.types import Output, Term
+from tubecert.spec.values import Output, Term
 
 
 def with_outputs(names: Names, field: Field | None) -> Names:
     """The names with those of the outputs; one that cannot be read stands for the first state."""
-    if field is None:
-        return names
-    taken, found = _taken(names), []
+    found: list[Output] = []
     example = f"{names.states[-1]} - 0.5*{names.states[0]}"
-    for key, node in field.pairs("of names to linear combinations of states", "tip: x + 0.5*y") or []:
-        entry = field.child(key, node)
-        name = new_name(key.text, key_field(field, key), "output", taken)
+    purpose = "of names to linear combinations of states"
+    for name, entry, written in new_names(field, purpose, "output", _taken(names), "tip: x + 0.5*y"):
         term = entry.term(names.of_state())
-        output = None if term is None else _linear(key.text, term, names)
+        output = None if term is None else _linear(written, term, names)
         if term is not None and output is None:
-            entry.fail(
-                codes.RANGE,
-                f"{entry.path} is not a sum of states times rational numbers",
-                f"an output is linear: write e.g. {example}, without a constant",
-            )
+            message = f"{entry.path} is not a sum of states times rational numbers"
+            help = f"an output is linear: write e.g. {example}, without a constant"
+            entry.fail(codes.RANGE, message, help)
         if name is not None:
             first = tuple(Fraction(state == names.states[0]) for state in names.states)
             found.append(output or Output(name=name, row=first))

@@ -7,10 +7,11 @@ problem.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TypeVar
+from operator import ge, gt, le
+from typing import Final, TypeVar
 
 from tubecert.expression import (
     MAX_LENGTH,
@@ -29,12 +30,13 @@ from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scal
 from tubecert.spec.instead import EXAMPLES, GONE, NO_NUMBER, OTHER_WORDS, glued, of_key, of_value
 from tubecert.spec.scope import MODERATE, Parameters, Scope, out_of_range
 from tubecert.spec.source import Mark, Source
-from tubecert.spec.types import Matrix, Term, TermMatrix
+from tubecert.spec.values import Matrix, Term, TermMatrix
 
 T = TypeVar("T")
 
 
 _DECIMAL = re.compile(r"[+-]?[0-9]+(\.[0-9]*)?")
+_BOUNDS: Final = {"above": (">", gt), "least": (">=", ge), "most": ("<=", le)}
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
     "symbol": codes.UNKNOWN_SYMBOL,
@@ -97,11 +99,7 @@ class Field:
     # collections
 
     def mapping(
-        self,
-        *,
-        required: Sequence[str] = (),
-        optional: Sequence[str] = (),
-        reserved: Sequence[str] = (),
+        self, *, required: Sequence[str] = (), optional: Sequence[str] = (), reserved: Sequence[str] = ()
     ) -> dict[str, Field] | None:
         """The values of the known keys; unknown, reserved and missing keys are findings."""
         keys = [*(required or optional)]
@@ -170,32 +168,19 @@ class Field:
             return None
         return self.node.text
 
-    def word(self, choices: Sequence[str], not_yet: Sequence[str] = ()) -> str | None:
+    def word(self, choices: Sequence[str]) -> str | None:
         """One of the words."""
         word = self.text(f"one of {', '.join(choices)}")
         if word is None or word in choices:
             return word
-        if word in not_yet:
-            self.fail(
-                codes.NOT_YET, f"{self.path}: {word} is not yet supported", f"use {' or '.join(choices)}"
-            )
-        else:
-            other = OTHER_WORDS.get(word.lower())
-            meant = f"here it is {other}; " if other in choices else ""
-            help = GONE.get(word) or meant + suggestion(word, choices, what="choices")
-            self.fail(codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", help)
+        other = OTHER_WORDS.get(word.lower())
+        meant = f"here it is {other}; " if other in choices else ""
+        help = GONE.get(word) or meant + suggestion(word, choices, what="choices")
+        self.fail(codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", help)
         return None
 
-    def number(
-        self,
-        parameters: Parameters,
-        *,
-        above: int | None = None,
-        least: int | None = None,
-        most: int | None = None,
-        side: Side = "nearest",
-    ) -> Fraction | None:
-        """A rational number, in its range; what contains pi is rounded to a side."""
+    def number(self, parameters: Parameters, *, side: Side = "nearest", **bounds: int) -> Fraction | None:
+        """A rational number, `above`, at `least` and at `most` its bounds; what contains pi is rounded to a side."""
         if not isinstance(self.node, Scalar):
             self._wrong_type("a number", self._one_number())
             return None
@@ -208,19 +193,12 @@ class Field:
         if extreme := out_of_range(value):
             self.fail(codes.LIMIT, f"{self.path} is {extreme}", MODERATE)
             return None
-        bounds = [
-            f"{sign} {bound}"
-            for sign, bound in ((">", above), (">=", least), ("<=", most))
-            if bound is not None
-        ]
-        if (
-            (above is not None and value <= above)
-            or (least is not None and value < least)
-            or (most is not None and value > most)
-        ):
-            self.fail(codes.RANGE, f"{self.path} is {self.node.text[:40]}; it must be {' and '.join(bounds)}")
-            return None
-        return value
+        told = [(*_BOUNDS[name], bounds[name]) for name in _BOUNDS if name in bounds]
+        if all(holds(value, bound) for _, holds, bound in told):
+            return value
+        needed = " and ".join(f"{sign} {bound}" for sign, _, bound in told)
+        self.fail(codes.RANGE, f"{self.path} is {self.node.text[:40]}; it must be {needed}")
+        return None
 
     def constant(self, parameters: Parameters) -> Expression | None:
         """A number as it is, with pi if it contains that."""
@@ -406,6 +384,16 @@ def root_field(reader: Reader, node: Node | None) -> Field:
     """The whole document; an empty file is an empty text."""
     start = Mark(line=0, column=0)
     return Field(reader=reader, path="", node=node or Scalar(start=start, end=start, text=""))
+
+
+def is_of_another_kind(root: Field, kinds: Mapping[str, tuple[str, str]]) -> bool:
+    """Reports a file of ours of another kind, by how one of its keys reads: what it lacks would be beside the point."""
+    for key, node in root.node.pairs if isinstance(root.node, MappingNode) else ():
+        text = f"{key.text}: {node.text if isinstance(node, Scalar) else ''}"
+        if told := next((told for start, told in kinds.items() if text.startswith(start)), None):
+            root.fail(codes.WRONG_TYPE, *told)
+            return True
+    return False
 
 
 def _counted(count: int, what: str) -> str:

@@ -1,97 +1,172 @@
-"""The sections `system` and `uncertainty`, and the metric: what the mathematics is about."""
+"""The sections `system`, `safe_set`, `uncertainty` and `disturbance`: what the mathematics is about."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final
+from typing import Any, Final
 
-from tubecert.expression import constant, free_symbols, root_above, substitute, to_text
-from tubecert.expression.waves import frequencies
-from tubecert.spec import codes
-from tubecert.spec.algebra import asymmetric_entry, dependent_columns
-from tubecert.spec.document import MappingNode
-from tubecert.spec.names import TIME, Names
+from tubecert.expression import (
+    MAX_NAME_LENGTH,
+    ZERO,
+    Expression,
+    Lookup,
+    constant,
+    free_symbols,
+    number_text,
+    root_above,
+    substitute,
+    suggestion,
+    symbol,
+    to_text,
+)
+from tubecert.spec import codes, keys
+from tubecert.spec.algebra import dependent_columns
+from tubecert.spec.document import ListNode, MappingNode
+from tubecert.spec.instead import glued
+from tubecert.spec.keys import NUMBER, SIZE, each, entry, expressions, form, key, numbers_text, section
+from tubecert.spec.lookup import SLOPES, TABLE
+from tubecert.spec.names import MAX_STATES, Names, key_field
 from tubecert.spec.reader import Field
-from tubecert.spec.synthesis import read_synthesis
-from tubecert.spec.types import Bounds, Metric, Synthesis, Term, TermMatrix, Uncertainty
+from tubecert.spec.values import Output, Term, TermMatrix, Vector
 
-_SYMMETRY_BUDGET = 20_000
-_LONG: Final = 10**12  # s, or that many times pi
+MAX_COLUMNS: Final = 32
+_NAMES: Final = {"type": "array", "items": keys.NAME, "minItems": 1, "maxItems": MAX_STATES}
+_UNITS: Final = {
+    "type": "object",
+    "additionalProperties": {"type": ["string", "number"], "minLength": 1, "maxLength": MAX_NAME_LENGTH},
+}
+_ROWS: Final = {"type": "array", "items": keys.TEXTS, "minItems": 1}
+_B: Final = {**_ROWS, "items": {**keys.TEXTS, "description": "A row: one entry per input."}}
+
+
+def _by_name(value: keys.Schema) -> dict[str, Any]:
+    return {"type": "object", "propertyNames": keys.NAME, "additionalProperties": value}
+
+
+def _parameters(known: Iterable[tuple[str, Fraction]], spec: Any) -> dict[str, Any]:
+    return {name: number_text(value) for name, value in known} | {
+        name: numbers_text(ends) for name, ends in spec.ranges
+    }
+
+
+def _tables(tables: Iterable[Lookup], _spec: Any) -> dict[str, Any]:
+    """The functions themselves: however their slopes were found, they are what counts."""
+    points = {own.name: zip(own.knots, own.values, own.slopes, strict=True) for own in tables}
+    return {
+        name: {"interpolation": SLOPES, "points": list(map(numbers_text, own))}
+        for name, own in points.items()
+    }
+
+
+def _outputs(outputs: Iterable[Output], spec: Any) -> dict[str, Any]:
+    """The sums that outputs are."""
+    states = [symbol(state) for state in spec.states]
+    sums = {own.name: zip(own.row, states, strict=True) for own in outputs}
+    return {name: to_text(sum((constant(q) * x for q, x in own), start=ZERO)) for name, own in sums.items()}
+
+
+class System:
+    """The system x' = f(x) + B(x) (u + h(t, x))."""
+
+    states = entry(form(_NAMES), needed=True, example=["p", "v"])
+    """Names of the states, 1 to 32."""
+    inputs = entry(form(_NAMES), needed=True, example=["u"])
+    """Names of the inputs; not more than states."""
+    parameters = entry(
+        form(_by_name({"anyOf": [NUMBER, keys.PAIR]}), _parameters),
+        always=True,
+        example={"g": 9.81, "l": "1/2", "m": [0.47, 0.5]},
+    )
+    """Constants by name, exact; each may use those before it. [lower, upper] is a constant of which only that is known:
+    it may be used in f, and with hardware in B, which the controller knows at the middle."""
+    tables = entry(
+        form(_by_name({"section": TABLE}), _tables),
+        example={"drag": {"points": [[0, 0], [10, 0.4], [20, 1.9]]}},
+    )
+    """Functions by name, each a smooth curve (C1) through the points of a table: drag: {file: drag.csv} makes drag(v) a
+    function in f, B, h and plans."""
+    definitions = entry(form(_by_name(keys.EXPRESSION)), into="", example={"s": "sin(p)", "d": "1 + m*s**2"})
+    """Names for expressions of states, t and parameters; each may use those before it, and stands for its expression
+    wherever it is used."""
+    outputs = entry(form(_by_name(keys.EXPRESSION), _outputs), example={"tip": "p + 0.5*q"})
+    """Linear combinations of the states, by name: sums of states times rational numbers. Each has a half-width
+    |c'(x - x*)| in the certificate, beside those of the states, and may be named in tube.half_widths,
+    synthesise.outputs and design --minimise."""
+    units = entry(form(_UNITS, lambda units, _: dict(units)), always=True, example={"p": "rad", "u": "N"})
+    """Units of states, inputs and outputs; for reports only."""
+    f = entry(
+        form(keys.TEXTS, lambda f, spec: keys.texts(spec.drift or f)),
+        needed=True,
+        example=["v", "-g/l*sin(p) - v"],
+    )
+    """The drift f(x) or f(t, x), one expression of states, parameters and t per state; continuously differentiable on
+    the safe set."""
+    B = entry(form(_B, lambda B, spec: keys.rows_of_texts(spec.gained or B)), needed=True, example=[[0], [1]])
+    """The input matrix B(x), one row per state, one column per input; of full column rank on the safe set."""
+
+
+SYSTEM: Final = section(System)
+SAFE_SET: Final = each("states", keys.inward())
+
+
+def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]:
+    """Units of states, inputs and outputs, as printed."""
+    units: list[tuple[str, str]] = []
+    if field is None:
+        return ()
+    for name, node in field.pairs("of names to units") or ():
+        own = field.child(name, node)
+        unit, known = own.text("a unit"), [*names.lengths, *names.inputs]
+        if name.text not in known:
+            message = f"{name.text[:60]} is neither a state nor an input"
+            help = glued(name.text, known) or suggestion(name.text, known)
+            key_field(field, name).fail(codes.UNKNOWN_KEY, message, help)
+        elif unit is not None and (not unit.isprintable() or not 0 < len(unit) <= MAX_NAME_LENGTH):
+            own.fail(codes.RANGE, f"a unit has 1 to {MAX_NAME_LENGTH} printable characters")
+        elif unit is not None:
+            units.append((name.text, unit))
+    return tuple(units)
 
 
 def read_dynamics(
     f: Field | None, B: Field | None, names: Names
-) -> tuple[tuple[Term, ...], TermMatrix] | None:
+) -> tuple[tuple[Term, ...] | None, TermMatrix | None]:
     """The drift f, of n entries, and the input matrix B, n x m; both may contain parameters known by a range."""
     n, m = len(names.states), len(names.inputs)
     drift = f.terms(n, names.of_drift(), "expressions, one per state") if f else None
     inputs = B.term_matrix(n, m, names.of_plant()) if B else None
-    if B is not None and inputs is not None and not _independent(B, inputs):
+    if inputs is not None and B is not None and not _independent(B, inputs):
         inputs = None
-    return (drift, inputs) if drift is not None and inputs is not None else None
+    return (None, None) if drift is None or inputs is None else (drift, inputs)
 
 
 def known_of(field: Field, terms: tuple[Term, ...], names: Names) -> tuple[Term, ...] | None:
     """What the controller knows: `terms` of f or B where every parameter known by a range is in its middle."""
+    middle = {name: constant((low + high) / 2) for name, (low, high) in names.ranges}
+    if not middle:
+        return terms
     try:
-        return _nominal(terms, names)
+        return tuple(_put(term, middle) for term in terms)
     except ZeroDivisionError:
         which = field.path.rpartition(".")[2]
-        field.fail(
-            codes.EXPRESSION,
-            f"{which} is undefined where every parameter is in the middle of its range",
-            "a divisor vanishes there; give ranges that keep away from it",
-        )
+        message = f"{which} is undefined where every parameter is in the middle of its range"
+        help = "a divisor vanishes there; give ranges that keep away from it"
+        field.fail(codes.EXPRESSION, message, help)
         return None
+
+
+def _put(term: Term, values: Mapping[str, Expression]) -> Term:
+    """A term at these values; raises `ZeroDivisionError`."""
+    own, *owed = substitute([term.expression, *(duty.argument for duty in term.obligations)], values)
+    duties = (replace(duty, argument=argument) for duty, argument in zip(term.obligations, owed, strict=True))
+    return replace(term, expression=own, obligations=tuple(duties))
 
 
 def is_uncertain(matrix: TermMatrix, names: Names) -> bool:
     """Whether a parameter that is known by a range stands in a matrix."""
     return bool(free_symbols(term.expression for row in matrix for term in row) & set(dict(names.ranges)))
-
-
-NO_SEARCH: Final = (
-    "write metric: {rate: ..., dual_metric: ...}, or --metric FILE; one that synth finds for f with t replaced by "
-    "a number may serve at all times, which certify proves"
-)
-
-
-def check_moving(f: Field, drift: Sequence[Term], beside: Iterable[tuple[bool, str, str]]) -> None:
-    """What is covered where f depends on t; `beside` is what is not, and what to write then."""
-    own = [term.expression for term in drift]
-    own += [owed.argument for term in drift for owed in term.obligations]
-    if TIME not in free_symbols(own):
-        return
-    for found, message, help in beside:
-        if found:
-            f.fail(codes.RANGE, f"f depends on t, {message}", help)
-
-
-def returns(terms: Sequence[Term]) -> bool:
-    """Whether a common period of terms, and of what they owe, is to be seen."""
-    owed = (duty.argument for term in terms for duty, _ in term.owed())
-    found = frequencies([*(term.expression for term in terms), *owed], TIME)
-    return found is not None and (found.period is None or found.period[0] < _LONG)
-
-
-def _nominal(drift: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
-    """Raises `ZeroDivisionError`."""
-    middle = {name: constant((low + high) / 2) for name, (low, high) in names.ranges}
-    if not middle:
-        return drift
-
-    def put(term: Term) -> Term:
-        arguments = substitute([term.expression, *(owed.argument for owed in term.obligations)], middle)
-        owed = zip(term.obligations, arguments[1:], strict=True)
-        return replace(
-            term,
-            expression=arguments[0],
-            obligations=tuple(replace(duty, argument=argument) for duty, argument in owed),
-        )
-
-    return tuple(put(term) for term in drift)
 
 
 def _independent(field: Field, matrix: TermMatrix) -> bool:
@@ -103,49 +178,108 @@ def _independent(field: Field, matrix: TermMatrix) -> bool:
     return False
 
 
-def read_uncertainty(field: Field, names: Names, *, sudden: bool) -> Uncertainty | None:
-    """Expressions, declared bounds, or both; `sudden`: of an h without expressions a bound of its size will do."""
-    entries = field.mapping(optional=("h", "bounds"))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """Declared bounds; all three without h."""
+
+    h: Fraction | None = key(SIZE, None)
+    """Bound of |h|, in units of the input; >= 0."""
+    h_x: Fraction | None = key(SIZE, None)
+    """Lipschitz constant of h in x; >= 0."""
+    h_t: Fraction | None = key(SIZE, None)
+    """Bound of |dh/dt|; >= 0."""
+
+
+BOUNDS: Final = section(
+    Bounds,
+    additionalProperties={
+        "type": "object",
+        "description": "The same three for the component of h that acts with an input; then for every input. Together "
+        "they bound h by the root of the sum of their squares.",
+        "properties": dict.fromkeys(("h", "h_x", "h_t"), NUMBER),
+        "additionalProperties": False,
+    },
+    examples=[
+        {"h": 0.12, "h_x": 0.01, "h_t": 0.2},
+        {"u1": {"h": 0.1, "h_x": 0, "h_t": 0.2}, "u2": {"h": 0.05, "h_x": 0, "h_t": 0.1}},
+    ],
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Uncertainty:
+    """The matched uncertainty h(t, x): as expressions, by declared bounds, or both (then the bounds are proven).
+    Needed, but for a question about a metric alone and beside hardware, where it is 0 if it is left out.
+
+    Never neither.
+    """
+
+    h: tuple[Term, ...] | None = key(
+        expressions("inputs", "of_uncertainty"), None, example=["0.1*sin(2*t) + 0.01*abs(v)"]
+    )
+    """h(t, x), one expression of t, states and parameters per input; may use abs and norm."""
+    bounds: Bounds | None = key(keys.inside(BOUNDS), None, late=True)
+
+    def __post_init__(self) -> None:
+        assert self.h is not None or self.bounds is not None
+
+
+UNCERTAINTY: Final = section(
+    Uncertainty,
+    anyOf=[
+        {"required": ["h"]},
+        {
+            "required": ["bounds"],
+            "properties": {
+                "bounds": {
+                    "anyOf": [{"required": list(BOUNDS.keys)}, {"additionalProperties": {"type": "object"}}]
+                }
+            },
+        },
+    ],
+)
+
+
+def read_uncertainty(field: Field | None, machine: Field | None, names: Names) -> Uncertainty | None:
+    """Expressions, declared bounds, or both; beside a machine h may be left out, and a bound of its size will do."""
+    if field is None:
+        return no_uncertainty(machine, len(names.inputs)) if machine else None
+    entries = UNCERTAINTY.entries(field)
     if entries is None:
         return None
     if not entries:
-        field.fail(
-            codes.MISSING_KEY,
-            "uncertainty needs h, bounds, or both",
-            'write h: ["0"] if there is no uncertainty, or bounds: {h: ..., h_x: ..., h_t: ...}',
-        )
+        message = "uncertainty needs h, bounds, or both"
+        help = 'write h: ["0"] if there is no uncertainty, or bounds: {h: ..., h_x: ..., h_t: ...}'
+        field.fail(codes.MISSING_KEY, message, help)
         return None
-    if sudden and len(entries) > 1:
-        field.fail(
-            codes.RANGE,
-            "uncertainty has h and bounds beside hardware",
-            "give one of the two: what h is, or what is known of it",
-        )
+    if machine and len(entries) > 1:
+        message = "uncertainty has h and bounds beside hardware"
+        help = "give one of the two: what h is, or what is known of it"
+        field.fail(codes.RANGE, message, help)
         return None
-    h = bounds = None
-    if "h" in entries:
-        h = entries["h"].terms(len(names.inputs), names.of_uncertainty(), "expressions, one per input")
+    values = UNCERTAINTY.sound(entries, names)
+    bounds = None
     if "bounds" in entries:
-        needed = () if "h" in entries else ("h",) if sudden else _BOUNDS
+        needed = () if "h" in entries else ("h",) if machine else tuple(BOUNDS.keys)
         bounds = _read_bounds(entries["bounds"], names, needed)
-    if ("h" in entries and h is None) or ("bounds" in entries and bounds is None):
+    if values is None or ("bounds" in entries and bounds is None):
         return None
-    return Uncertainty(h=h, bounds=bounds)
+    return Uncertainty(**values, bounds=bounds)
+
+
+def no_uncertainty(field: Field, inputs: int) -> Uncertainty:
+    """h = 0, where nothing is said of it."""
+    return Uncertainty(h=tuple(keys.constant_term(field, Fraction(0)) for _ in range(inputs)), bounds=None)
 
 
 def _read_bounds(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | None:
     """Declared bounds, those that are needed among them."""
-    if isinstance(field.node, MappingNode) and any(
-        isinstance(node, MappingNode) for _, node in field.node.pairs
-    ):
+    nodes = [node for _, node in field.node.pairs] if isinstance(field.node, MappingNode) else []
+    if any(isinstance(node, MappingNode) for node in nodes):
         return _combined(field, names, needed)
-    entries = field.mapping(required=needed, optional=tuple(key for key in _BOUNDS if key not in needed))
-    if entries is None:
-        return None
-    values = {key: entry.number(names.values, least=0, side="above") for key, entry in entries.items()}
-    if None in values.values():
-        return None
-    return Bounds(h=values.get("h"), h_x=values.get("h_x"), h_t=values.get("h_t"))
+    entries = BOUNDS.entries(field, needed)
+    values = BOUNDS.sound(entries, names)
+    return None if values is None else Bounds(**values)
 
 
 def _combined(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | None:
@@ -161,83 +295,80 @@ def _combined(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | N
     if len(parts) < len(found):
         return None
     total: dict[str, Fraction | None] = {}
-    for key in _BOUNDS:
-        known = [value for part in parts for value in [getattr(part, key)] if value is not None]
+    for name in BOUNDS.keys:
+        known = [value for part in parts for value in [getattr(part, name)] if value is not None]
         if known and len(known) < len(parts):
-            message = f"{field.path} bounds {key} of some inputs only"
-            field.fail(codes.MISSING_KEY, message, f"bound {key} of every input, or of none")
+            message = f"{field.path} bounds {name} of some inputs only"
+            field.fail(codes.MISSING_KEY, message, f"bound {name} of every input, or of none")
             return None
-        total[key] = root_above(sum((q * q for q in known), start=Fraction(0))) if known else None
+        total[name] = root_above(sum((q * q for q in known), start=Fraction(0))) if known else None
     return Bounds(**total)
 
 
-_BOUNDS: Final = ("h", "h_x", "h_t")
-METRIC_KEYS: Final = ("dual_metric", "rate", "bounds")
+def _bound(field: Field, names: Names, columns: int | None) -> Fraction | Vector | None:
+    """|w|, or |w_i| by column of E."""
+    if not isinstance(field.node, ListNode):
+        return field.number(names.values, least=0, side="above")
+    items = field.items(columns, "numbers, one per column of E") or []
+    sizes = [item.number(names.values, least=0, side="above") for item in items]
+    found = tuple(size for size in sizes if size is not None)
+    return found if found and len(found) == len(sizes) else None
 
 
-def wanted_metric(field: Field, names: Names) -> Synthesis | None:
-    """What is to be synthesised, if the section asks for that; then nothing else may stand in it."""
-    pairs = field.pairs() if isinstance(field.node, MappingNode) else None
-    if not pairs or all(key.text != "synthesise" for key, _ in pairs):
+def _shape(field: Field, names: Names) -> TermMatrix | None:
+    """E with as many columns as its first row has."""
+    rows = field.items(len(names.states), "rows, one per state", "write [[...], ...], a row for every state")
+    width = len(rows[0].items(None, "expressions") or ()) if rows else 0
+    if not rows or not width:
         return None
-    entries = field.mapping(required=("synthesise",), optional=METRIC_KEYS)
-    if entries is None or "synthesise" not in entries:
+    if width > MAX_COLUMNS:
+        field.fail(codes.LIMIT, f"{field.path} has {width} columns; at most {MAX_COLUMNS} are read")
         return None
-    for key in METRIC_KEYS:
-        if key in entries:
-            entries[key].fail(
-                codes.RANGE, f"{entries[key].path} beside metric.synthesise", "give a metric, or ask for one"
-            )
-    return read_synthesis(entries["synthesise"], names)
+    return field.term_matrix(len(names.states), width, names.of_state())
 
 
-def read_metric(field: Field, names: Names) -> Metric | None:
-    """The dual metric with its rate, and declared bounds of the metric."""
-    entries = field.mapping(required=METRIC_KEYS[:2], optional=METRIC_KEYS[2:])
-    return None if entries is None else metric_of(entries, names)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """What acts on the states beside the inputs: x' = f + B (u + h) + E w, with |w| bounded and otherwise arbitrary:
+    gusts, unmodelled forces.
 
+    E (n, k); |w| <= `bound`, or |w_i| <= `bound`[i] (k) beside hardware; `rate` in 1/s, if |w'|, or every |w_i'|, is at
+    most that.
+    """
 
-def metric_of(entries: Mapping[str, Field], names: Names) -> Metric | None:
-    """The metric that the values of the keys make up; None if one is missing or wrong."""
-    n = len(names.states)
-    rate = entries["rate"].number(names.values, above=0) if "rate" in entries else None
-    dual = entries["dual_metric"].term_matrix(n, n, names.of_state()) if "dual_metric" in entries else None
-    if dual is not None and not _symmetric(entries["dual_metric"], dual):
-        dual = None
-    bounds = _metric_bounds(entries["bounds"], names) if "bounds" in entries else (None, None)
-    if rate is None or dual is None or bounds is None:
-        return None
-    return Metric(dual_metric=dual, rate=rate, lower=bounds[0], upper=bounds[1])
-
-
-def _symmetric(field: Field, matrix: TermMatrix) -> bool:
-    found = asymmetric_entry([[term.expression for term in row] for row in matrix], _SYMMETRY_BUDGET)
-    if found is None:
-        return True
-    i, j, proven = found
-    above, below = (to_text(matrix[k][l].expression)[:60] for k, l in ((i, j), (j, i)))
-    where = f"({i + 1},{j + 1}) = {above} and ({j + 1},{i + 1}) = {below}"
-    relation = "differ" if proven else "could not be proven equal"
-    field.reader.report(
-        codes.SYMMETRY,
-        matrix[j][i].location,
-        f"dual_metric is not symmetric: {where} {relation}",
-        "write the same expression in both places",
+    E: TermMatrix = key(keys.Kind(_shape, _ROWS, keys.rows_of_texts), (), example=[[0], [1]])
+    """A row of expressions for every state, a column for every component of w; the identity by default."""
+    bound: Fraction | Vector = key(
+        form(
+            {"anyOf": [NUMBER, keys.LIST]},
+            lambda own, _: numbers_text(own) if isinstance(own, tuple) else number_text(own),
+        ),
+        late=True,
+        example=0.05,
     )
-    return False
+    """|w| is at most this; with hardware also a list, of what each component of w is at most."""
+    rate: Fraction | None = key(SIZE, None)
+    """|dw/dt| (with hardware: that of each component) is at most this, in 1/s, if that is known: then the part of E w
+    that the inputs can reach is adapted to."""
+
+    @property
+    def length(self) -> Fraction:
+        """The bound of |w| of a loop in continuous time."""
+        assert isinstance(self.bound, Fraction)
+        return self.bound
 
 
-def _metric_bounds(field: Field, names: Names) -> tuple[Fraction, Fraction] | None:
-    entries = field.mapping(required=("lower", "upper"))
-    if entries is None or len(entries) < 2:
+DISTURBANCE: Final = section(Disturbance, examples=[{"E": [[0], [1]], "bound": 0.05}])
+
+
+def read_disturbance(field: Field, names: Names) -> Disturbance | None:
+    """E, the bound and the rate of w; None if the section is unsound."""
+    entries = DISTURBANCE.entries(field)
+    if entries is None:
         return None
-    lower = entries["lower"].number(names.values, above=0)
-    upper = entries["upper"].number(names.values, above=0)
-    if lower is None or upper is None:
-        return None
-    if lower > upper:
-        field.fail(
-            codes.RANGE, f"{field.path}: lower must not exceed upper", "they bound the eigenvalues of W^-1"
-        )
-        return None
-    return lower, upper
+    values = DISTURBANCE.values(entries, names)
+    sound, n = DISTURBANCE.holds(values, entries), range(len(names.states))
+    identity = tuple(tuple(keys.constant_term(field, Fraction(i == j)) for j in n) for i in n)
+    E = values.pop("E", None if "E" in entries else identity)
+    bound = _bound(entries["bound"], names, len(E[0]) if E else None) if "bound" in entries else None
+    return Disturbance(**values, E=E, bound=bound) if sound and bound is not None else None

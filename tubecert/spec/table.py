@@ -20,7 +20,7 @@ from tubecert.spec import codes
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.sheet import ENOUGH, Cell, Sheet, number, opened, rows
-from tubecert.spec.types import Interpolation, Knots, Table
+from tubecert.spec.values import Interpolation, Knots, Table
 
 MAX_ROWS: Final = 10_001
 _COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}", re.ASCII)

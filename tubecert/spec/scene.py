@@ -1,0 +1,252 @@
+"""The sections `obstacles` and `simulation`: what stands around, and what `simulate` does, which proves nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import combinations
+from typing import Any, ClassVar, Final
+
+from tubecert import letters
+from tubecert.spec import codes, keys
+from tubecert.spec.document import Scalar
+from tubecert.spec.keys import PAIR, YES, Kind, entry, expressions, inside, key, number, section
+from tubecert.spec.names import Names
+from tubecert.spec.plan import Trajectory
+from tubecert.spec.reader import Field
+from tubecert.spec.values import Matrix, Term, Vector
+
+CONTROLLERS: Final = ("nominal", "ccm", "reference", "l1")
+MAX_OBSTACLES: Final = 1_000
+MAX_VERTICES: Final = 200
+MAX_RUNS: Final = 1_000_000
+MAX_SEED: Final = 2**63 - 1
+
+Segment = tuple[Vector, Vector]
+
+_GAINS: Final = letters.words_of(letters.ADAPTIVE)
+_CORNERS: Final = {"type": "array", "items": PAIR, "minItems": 3, "maxItems": MAX_VERTICES}
+_CONTROLLER: Final = {"enum": list(CONTROLLERS), "description": "A controller."}
+_PLANE: Final = {"type": "array", "items": keys.NAME, "minItems": 2, "maxItems": 2}
+
+
+def _read_plane(field: Field, names: Names) -> tuple[str, str] | None:
+    """Two different states."""
+    help = f"write [{', '.join(names.states[:2])}]"
+    items = field.items(2, "names of states", help) or []
+    chosen = [item.word(names.states) for item in items]
+    if len(chosen) != 2 or chosen[0] is None or chosen[1] is None:
+        return None
+    if chosen[0] == chosen[1]:
+        items[1].fail(codes.RANGE, f"{chosen[1]} occurs twice", help)
+        return None
+    return chosen[0], chosen[1]
+
+
+def _polygon(field: Field, names: Names) -> Matrix | None:
+    """The corners of a simple polygon: its edges meet at common corners only."""
+    if isinstance(field.node, Scalar):
+        field.items(None, "corners")
+        return None
+    items = field.items(None, "corners") or []
+    if not 3 <= len(items) <= MAX_VERTICES:
+        field.fail(codes.WRONG_SHAPE, f"{field.path} has {len(items)} corners; it needs 3 to {MAX_VERTICES}")
+        return None
+    corners = [item.numbers(2, names.values) for item in items]
+    found = tuple(corner for corner in corners if corner is not None)
+    if len(found) < len(items):
+        return None
+    for i, j in _crossings(found):
+        message = f"{field.path}: the edges from corners {i + 1} and {j + 1} touch or cross"
+        help = "list the corners once, in the order in which one meets them going round"
+        items[j].fail(codes.RANGE, message, help)
+        return None
+    return found
+
+
+def _crossings(corners: Matrix) -> Iterator[tuple[int, int]]:
+    """Pairs of edges, by their first corners, that have more in common than a corner between them (exact)."""
+    count = len(corners)
+    edges = [(corners[i], corners[(i + 1) % count]) for i in range(count)]
+    for i, j in combinations(range(count), 2):
+        follows, precedes = j == i + 1, (j + 1) % count == i
+        if follows or precedes:
+            first, second = (edges[i], edges[j]) if follows else (edges[j], edges[i])
+            if _folded(first, second):
+                yield i, j
+        elif _meet(edges[i], edges[j]):
+            yield i, j
+
+
+def _turn(a: Vector, b: Vector, c: Vector) -> int:
+    """1 if a, b, c turn left, -1 if right, 0 if they are on a line."""
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    return (area > 0) - (area < 0)
+
+
+def _folded(first: Segment, second: Segment) -> bool:
+    """Whether an edge runs back along the one before it, or has no length."""
+    (a, b), (_, c) = first, second
+    if b in (a, c):
+        return True
+    ahead = (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1])
+    return _turn(a, b, c) == 0 and ahead < 0
+
+
+def _meet(first: Segment, second: Segment) -> bool:
+    """Whether two segments have a point in common."""
+    (a, b), (c, d) = first, second
+    turns = _turn(a, b, c), _turn(a, b, d), _turn(c, d, a), _turn(c, d, b)
+    if turns[0] != turns[1] and turns[2] != turns[3]:
+        return True
+    return any(
+        turn == 0 and _between(ends, point)
+        for turn, ends, point in zip(turns, (first, first, second, second), (c, d, a, b), strict=True)
+    )
+
+
+def _between(ends: Segment, point: Vector) -> bool:
+    """Whether a point on the line of a segment lies in the segment's bounding box."""
+    return all(min(p, q) <= value <= max(p, q) for p, q, value in zip(*ends, point, strict=True))
+
+
+_DISC: Final = keys.Section(
+    words="A disc.",
+    keys={
+        "center": entry(keys.numbers(2, PAIR), words="Its centre.", needed=True),
+        "radius": entry(number(above=0, side="above"), words="Its radius; > 0.", needed=True),
+    },
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Obstacle:
+    """An obstacle: a polygon or a disc.
+
+    Corners (K, 2), or a centre and a radius, in the plane of two states; `decides`: whether the verdict asks for
+    clearance from it.
+    """
+
+    states: tuple[str, str] = key(Kind(_read_plane, _PLANE), late=True, needed=False, example=["px", "pz"])
+    """The two states of its plane; may be left out if there are only two."""
+    polygon: Matrix = key(
+        Kind(_polygon, _CORNERS, keys.rows_of_numbers),
+        (),
+        late=True,
+        example=[[0.5, 0.5], [0.9, 0.5], [0.7, 0.9]],
+    )
+    """Corners, once each, in the order in which one meets them going round."""
+    disc: ClassVar = entry(inside(_DISC), into="", late=True)
+    center: Vector = ()
+    radius: Fraction | None = None
+    decides: bool = key(replace(YES, write=lambda told, _: told), True, name="decide", late=True, said=True)
+    """false: the clearance is told and does not decide the verdict."""
+
+    def __post_init__(self) -> None:
+        assert (len(self.polygon) >= 3) == (self.radius is None)
+
+
+OBSTACLE: Final = section(Obstacle, oneOf=[{"required": ["polygon"]}, {"required": ["disc"]}])
+
+
+def read_obstacles(field: Field, names: Names) -> tuple[Obstacle, ...] | None:
+    """The obstacles in the order of the file; None if one of them is unsound."""
+    items = field.items(None, "obstacles")
+    if items is None:
+        return None
+    if len(items) > MAX_OBSTACLES:
+        field.fail(codes.LIMIT, f"there are {len(items)} obstacles; at most {MAX_OBSTACLES} are read")
+        return None
+    found = [_obstacle(item, names) for item in items]
+    sound = tuple(own for own in found if own)
+    return sound if len(sound) == len(found) else None
+
+
+def _obstacle(field: Field, names: Names) -> Obstacle | None:
+    entries = OBSTACLE.entries(field)
+    if entries is None:
+        return None
+    plane = _plane(entries.get("states"), field, names)
+    if ("polygon" in entries) == ("disc" in entries):
+        message = "an obstacle is either a polygon or a disc"
+        help = "write polygon: [[...], ...], or disc: {center: [...], radius: r}"
+        field.fail(codes.MISSING_KEY, message, help)
+        return None
+    decides = YES.read(entries["decide"], names) is not False if "decide" in entries else True
+    if "polygon" in entries:
+        corners = _polygon(entries["polygon"], names)
+        return Obstacle(states=plane, polygon=corners, decides=decides) if plane and corners else None
+    disc = _DISC.sound(_DISC.entries(entries["disc"]), names)
+    return Obstacle(states=plane, **disc, decides=decides) if plane and disc else None
+
+
+def _plane(field: Field | None, owner: Field, names: Names) -> tuple[str, str] | None:
+    """Two different states, by default the only two that there are."""
+    if field is not None:
+        return _read_plane(field, names)
+    if len(names.states) == 2:
+        return names.states[0], names.states[1]
+    owner.fail(codes.MISSING_KEY, "the obstacle lacks states", f"add states: [{', '.join(names.states[:2])}]")
+    return None
+
+
+def obstacles_data(obstacles: Iterable[Obstacle], spec: Any) -> list[dict[str, Any]]:
+    """The canonical form; that one decides goes without saying."""
+    return [_obstacle_data(obstacle, spec) for obstacle in obstacles]
+
+
+def _obstacle_data(own: Obstacle, spec: Any) -> dict[str, Any]:
+    disc = {} if own.radius is None else {"disc": _DISC.written(own, spec)}
+    told = OBSTACLE.written(own, spec)
+    return {name: value for name, value in told.items() if value is not True} | disc
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulation:
+    """What `simulate` does if the command line does not say otherwise. It proves nothing.
+
+    h (m) is the uncertainty that acts in place of `uncertainty.h`.
+    """
+
+    controllers: tuple[str, ...] = key(
+        keys.several(
+            CONTROLLERS, "controller", "controllers", items=_CONTROLLER, minItems=1, uniqueItems=True
+        ),
+        (),
+        example=["ccm", "l1"],
+    )
+    """The loops to run, each once."""
+    gains: str | None = key(
+        keys.word(*_GAINS, also=(26,), means={each: letters.name_of(each).option for each in _GAINS}), None
+    )
+    """Whose gains of a certificate are used."""
+    duration: Fraction | None = key(number(above=0), None)
+    """How long is simulated, in s; at most the horizon."""
+    runs: int | None = key(number(least=1, most=MAX_RUNS, whole=""), None)
+    """Number of random runs; a whole number."""
+    seed: int | None = key(number(least=0, most=MAX_SEED, whole=""), None)
+    """Seed of the random runs; a whole number."""
+    plane: tuple[str, str] | None = key(Kind(_read_plane, _PLANE), None)
+    """The two states that are drawn."""
+    h: tuple[Term, ...] | None = key(expressions("inputs", "of_uncertainty"), None)
+    """The uncertainty to simulate, one expression of t and the states per input; by default the one of
+    `uncertainty`."""
+
+
+SIMULATION: Final = section(Simulation)
+
+
+def read_simulation(field: Field | None, plan: Trajectory | None, names: Names) -> Simulation | None:
+    """Defaults of the command `simulate`; None if the section is absent or unsound."""
+    entries = SIMULATION.entries(field)
+    if entries is None:
+        return None
+    values = SIMULATION.values(entries, names)
+    duration, horizon = values.get("duration"), plan and plan.horizon
+    if duration is not None and horizon is not None and duration > horizon:
+        entries["duration"].fail(
+            codes.RANGE, "the duration exceeds trajectory.horizon", "the plan ends there"
+        )
+        return None
+    return Simulation(**values) if SIMULATION.holds(values, entries) else None

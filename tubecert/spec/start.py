@@ -1,0 +1,139 @@
+"""The section `initial_state`: where the system starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Final
+
+from tubecert.expression import ZERO, number_text, substitute, to_text
+from tubecert.spec import codes
+from tubecert.spec.document import MappingNode
+from tubecert.spec.keys import LIST, NAME, PAIR, form, key, number, numbers_text, section
+from tubecert.spec.names import TIME, Names
+from tubecert.spec.plan import Trajectory, read_ends
+from tubecert.spec.reader import Field
+from tubecert.spec.values import Ends, Vector
+
+_AT: Final = {"anyOf": [LIST, {"$ref": "#/$defs/start_by_state"}], "examples": [[0.01, 0], {"phi": "30 deg"}]}
+_BOX: Final = {"type": "object", "propertyNames": NAME, "additionalProperties": PAIR}
+MAX_WIDE: Final = 10  # sides of a box of starts: all its corners are examined
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InitialState:
+    """Where the system starts: a point, anywhere in a box, or anywhere within a radius of the plan's start. By default
+    on the plan.
+
+    `x0` None if unreadable, the centre of the `box` (n pairs) if there is one.
+    """
+
+    x0: Vector | None = key(form(_AT), None, name="at")
+    """The initial state: one number per state, or numbers by state (others start on the plan)."""
+    within: Fraction | None = key(number(above=0, side="above"), None)
+    """Radius around the plan's start, in the Euclidean norm; > 0."""
+    box: tuple[Ends, ...] = key(form(_BOX), (), example={"x": [-0.1, 0.1]})
+    """[lower, upper] by state: the claim is for every start in the box. States that are not named start on the plan."""
+
+
+INITIAL_STATE: Final = section(InitialState, oneOf=[{"required": [way]} for way in ("at", "box", "within")])
+
+
+def initial_state_data(x0: Vector, spec: Any) -> dict[str, Any]:
+    """The canonical form: the one of the three ways that counts."""
+    if spec.within is not None:
+        return {"within": number_text(spec.within)}
+    ends = zip(spec.states, map(numbers_text, spec.start_box), strict=False)
+    return {"box": dict(ends)} if spec.start_box else {"at": numbers_text(x0)}
+
+
+def read_initial_state(
+    field: Field | None, trajectory: Field | None, plan: Trajectory | None, names: Names
+) -> InitialState:
+    """The initial state, by default the start of the plan."""
+
+    def planned() -> Vector | None:
+        return _start(trajectory, plan) if trajectory and plan else None
+
+    if plan is not None and plan.bundle is not None and (field is None or field.get("within") is None):
+        message = "a family of plans has no start of its own"
+        where = trajectory if field is None else field
+        if where is not None:
+            help = "write initial_state: {within: r}: how far from the start of its plan the state may be"
+            where.fail(codes.MISSING_KEY, message, help)
+        return InitialState(x0=None)
+    if field is None:
+        return InitialState(x0=planned())
+    entries = INITIAL_STATE.entries(field)
+    if entries is None:
+        return InitialState(x0=None)
+    if len(entries) != 1:
+        message = "the initial state is a point, a box, or a radius around the plan's start"
+        field.fail(codes.MISSING_KEY, message, "write at: [...], box: {x: [low, high], ...}, or within: r")
+        return InitialState(x0=None)
+    if "within" in entries:
+        radius = entries["within"].number(names.values, above=0, side="above")
+        return InitialState(x0=planned(), within=radius)
+    (given,) = entries.values()
+    if isinstance(given.node, MappingNode):
+        ends = _named_ends(given, planned, names, point="at" in entries)
+    else:
+        items = given.items(len(names.states), "numbers") or []
+        ends = [read_ends(item, names, point="at" in entries) for item in items]
+    box = tuple(end for end in ends if end is not None)
+    if len(box) < len(names.states):
+        return InitialState(x0=None)
+    if (wide := sum(low < high for low, high in box)) > MAX_WIDE:
+        field.fail(
+            codes.LIMIT, f"the box of starts has {wide} sides of some width; at most {MAX_WIDE} are read"
+        )
+        return InitialState(x0=None)
+    centre = tuple((low + high) / 2 for low, high in box)
+    return InitialState(x0=centre, box=box if any(low < high for low, high in box) else ())
+
+
+def _named_ends(
+    field: Field, planned: Callable[[], Vector | None], names: Names, *, point: bool
+) -> list[Ends | None]:
+    """Values or ranges by state; a state that is not named starts on the plan."""
+    entries = field.mapping(optional=names.states)
+    if entries is None:
+        return []
+    start = planned() if len(entries) < len(names.states) else None
+    others = [None] * len(names.states) if start is None else [(value, value) for value in start]
+    return [
+        read_ends(entries[name], names, point=point) if name in entries else other
+        for name, other in zip(names.states, others, strict=True)
+    ]
+
+
+def _start(field: Field, plan: Trajectory) -> Vector | None:
+    """x*(0), if it is rational."""
+    if plan.table is not None:
+        return plan.table.knots.x[0]
+    if plan.bundle is not None:
+        return tuple((low + high) / 2 for low, high in plan.bundle.x)  # one of the starts that there may be
+    if plan.task is not None:
+        if not plan.task.start:
+            message = "the planner needs a start"
+            field.fail(codes.MISSING_KEY, message, "add initial_state: {at: [...]}, or trajectory.start")
+        return plan.task.start or None
+    start = []
+    for term in plan.x:
+        try:
+            value = substitute([term.expression], {TIME: ZERO})[0]
+        except ZeroDivisionError:
+            message = "the plan is not defined at t = 0"
+            field.reader.report(codes.RANGE, term.location, message, "the horizon begins at t = 0")
+            return None
+        if not value.is_constant:
+            field.reader.report(
+                codes.MISSING_KEY,
+                term.location,
+                f"the plan starts at {to_text(value)[:60]}, which is not rational; initial_state is needed",
+                "add initial_state: {at: [...]}",
+            )
+            return None
+        start.append(value.fraction)
+    return tuple(start)
