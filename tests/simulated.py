@@ -11,6 +11,8 @@ from shared import once
 
 from tubecert import pipeline
 from tubecert.certificate.result import Result
+from tubecert.simulate.engine import integrate
+from tubecert.simulate.problem import Batch, Disturbance, LoopProblem
 from tubecert.simulate.reading import adopted
 from tubecert.simulate.runs import Failure, Peak, Runs, Worst
 from tubecert.simulate.setting import Setting, setting_of
@@ -50,6 +52,12 @@ def setting(name: str, epsilon: str | None = None, duration: str | None = None) 
     """The setting of a specification."""
     spec, result = certified(name, epsilon)
     return setting_of(spec, result, None if duration is None else Fraction(duration))
+
+
+def alone(problem: LoopProblem, x0: np.ndarray, disturbance: Disturbance, *, tolerance: float) -> Runs:
+    """The runs of one batch."""
+    batch = Batch(problem=problem, x0=np.asarray(x0, dtype=float), disturbance=disturbance)
+    return integrate([batch], tolerance=tolerance)[0]
 
 
 def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **changes: Any) -> Runs:

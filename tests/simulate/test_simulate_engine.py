@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from simulated import alone
 from systems import plain_model
 
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulate.engine import integrate as together
-from tubecert.simulate.integrator import integrate
+from tubecert.simulate.engine import integrate
 from tubecert.simulate.problem import Batch, Disturbance, LoopGains, LoopProblem, nothing_beside
-from tubecert.spec import load_text
+from tubecert.spec import Knots, load_text
+from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import constant_plan
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -113,7 +114,7 @@ def test_loops_agree_with_dop853(controller):
     case = problem(controller, gains=gains)
     z0 = np.concatenate([START[0], np.zeros(SIZES[controller])])
     expected = dop853(right_hand_side(controller, gains), z0, case.times)
-    found = integrate(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-5)
+    found = alone(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-5)
     assert not found.failures
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     if controller == "l1":
@@ -144,7 +145,7 @@ def test_a_wind_moves_the_state_and_not_what_is_predicted(controller, radius):
     h = Disturbance.from_expressions(wavy_h(), TWO, 1, k=1)
     blowing = {"wind": 1.0, "blowing": [1.0], "gusting": [2.0, 0.4]}
     h = replace(h, beside=h.beside._replace(**{name: np.array([value]) for name, value in blowing.items()}))
-    found = integrate(case, START, h, tolerance=1e-5)
+    found = alone(case, START, h, tolerance=1e-5)
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     if controller == "l1":
         assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 2e-5
@@ -166,7 +167,7 @@ def test_a_wind_that_aims(aim):
     h = replace(Disturbance.from_expressions(wavy_h(), TWO, 1, k=2), layer=2.0)
     blowing = {"wind": 0.5, "aim": float(aim), "gusting": [0.0, np.pi / 2]}
     h = replace(h, beside=h.beside._replace(**{name: np.array([value]) for name, value in blowing.items()}))
-    found = integrate(case, START, h, tolerance=1e-5)
+    found = alone(case, START, h, tolerance=1e-5)
     assert np.abs(found.x[0] - dop853(rate, START[0], case.times)).max() <= found.error[0] <= 5e-5
 
 
@@ -180,7 +181,7 @@ def scalar(f, B):
 def levels(case, x0, h, count):
     """x at the output times (K, n) for one level of steps after the other."""
     batch = Batch(problem=case, x0=x0, disturbance=Disturbance.from_expressions(h, case.model, 1))
-    return [together([batch], tolerance=1.0, level=j)[0].x[0] for j in range(count)]
+    return [integrate([batch], tolerance=1.0, level=j)[0].x[0] for j in range(count)]
 
 
 ORIGIN = constant_plan([Fraction(0)], [Fraction(0)], None)
@@ -260,7 +261,7 @@ def test_state_dependent_inputs_agree_with_dop853(controller):
     start = np.array([[0.2, -0.25]])
     z0 = np.concatenate([start[0], np.zeros(SIZES[controller])])
     expected = dop853(slanted_rate(controller, gains), z0, case.times)
-    found = integrate(case, start, Disturbance.from_expressions(SLANTED.h, SLANTED, 1), tolerance=1e-5)
+    found = alone(case, start, Disturbance.from_expressions(SLANTED.h, SLANTED, 1), tolerance=1e-5)
     assert not found.failures
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     assert found.distance[0, 0] == pytest.approx(
@@ -289,15 +290,15 @@ def test_lanes_do_not_know_each_other():
     d.push[7] = 0.0
     gains = LoopGains(bandwidth=20.0, projection_radius=3.0, predictor_gain=2.0, adaptation_rate=1e4)
     case = problem("l1", model=UNSTABLE, gains=gains, horizon=1.0)
-    vector = integrate(case, starts, d, tolerance=1e-5)
+    vector = alone(case, starts, d, tolerance=1e-5)
     assert [item.lane for item in vector.failures] == [7]
     assert vector.error[7] == np.inf
     assert np.isnan(vector.x[7, -1]).all()
     assert vector.worst.h.value.max() <= 1.5 * (1 + 1e-12)
     for lane in (0, 39):
-        alone = integrate(case, starts[[lane]], d.of(np.array([lane])), tolerance=1e-5)
-        assert np.allclose(alone.x[0], vector.x[lane], rtol=0, atol=1e-12)  # BLAS sums in another order
-        assert alone.worst.distance.value[0] == pytest.approx(vector.worst.distance.value[lane], abs=1e-12)
+        own = alone(case, starts[[lane]], d.of(np.array([lane])), tolerance=1e-5)
+        assert np.allclose(own.x[0], vector.x[lane], rtol=0, atol=1e-12)  # BLAS sums in another order
+        assert own.worst.distance.value[0] == pytest.approx(vector.worst.distance.value[lane], abs=1e-12)
 
 
 # x1' = x2 + 0.1 x1^3 escapes in finite time from far away
@@ -324,7 +325,7 @@ def test_disturbances_are_what_they_say():
         layer=0.05,
     )
     case = problem("ccm", K=9)
-    found = integrate(case, START, d, tolerance=1e-6)
+    found = alone(case, START, d, tolerance=1e-6)
     M = np.linalg.inv(W2)
     clipped = 0
     for t, x, h in zip(found.t, found.x[0], found.h[0], strict=True):
@@ -342,11 +343,37 @@ def test_errors_are_measured_in_the_coordinates_of_the_tube():
     """A narrow tube in one state asked for its own accuracy of all states, in whatever unit these are."""
     S = np.array([[30.0, 0.0], [2.0, 0.5]])
     still = Disturbance.from_expressions(wavy_h(), TWO, 1)
-    plain, own = (integrate(problem("ccm", P=P), START, still, tolerance=1e9) for P in (None, S.T @ S))
+    plain, own = (alone(problem("ccm", P=P), START, still, tolerance=1e9) for P in (None, S.T @ S))
     assert own.x == pytest.approx(plain.x, abs=1e-13)
     change = own.error[0] / plain.error[0]
     assert np.linalg.norm(S, -2) < change < np.linalg.norm(S, 2)
     assert change > 2
+
+
+X_ROWS, U_ROWS = ("0 0", "1/5 1/10", "1/10 0"), ("0", "3/10", "3/10")
+
+
+@pytest.mark.slow
+def test_loops_along_several_plans_are_lanes_of_one_vector():
+    """Two loops and two plans, with corners and jumps of their own: as each gives alone, but for their steps."""
+    gains = LoopGains(bandwidth=25.0, projection_radius=3.0, predictor_gain=2.0, adaptation_rate=4e3)
+    plans = [PLAN]
+    for times in (("0", "0.71", "2"), ("0", "1.3", "2")):
+        t, x, u = (
+            tuple(tuple(Fraction(e) for e in row.split()) for row in part) for part in (times, X_ROWS, U_ROWS)
+        )
+        plans.append(piecewise_plan(TWO, Knots(t=tuple(e for (e,) in t), x=x, u=u, interpolation="hold")))
+    still = Disturbance.from_expressions(wavy_h(), TWO, 1)
+    batches = [
+        Batch(problem=problem(name, plan=plan, gains=gains), x0=START, disturbance=still)
+        for plan in plans
+        for name in ("ccm", "l1")
+    ]
+    for found, batch in zip(integrate(batches, tolerance=1e-5), batches, strict=True):
+        (own,) = integrate([batch], tolerance=1e-5)
+        assert np.abs(own.x - found.x).max() <= own.error[0] + found.error[0] <= 1e-4
+        assert np.array_equal(own.x_plan, found.x_plan)
+        assert np.array_equal(own.u_plan, found.u_plan)
 
 
 def test_bad_arguments_are_refused():
@@ -362,7 +389,7 @@ def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match="bandwidth"):
         LoopGains(bandwidth=0.0, projection_radius=1.0)
     with pytest.raises(ValueError, match="lanes"):
-        integrate(problem("ccm"), START, Disturbance.from_expressions(None, TWO, 2), tolerance=1e-3)
+        alone(problem("ccm"), START, Disturbance.from_expressions(None, TWO, 2), tolerance=1e-3)
 
 
 @pytest.mark.slow
@@ -374,7 +401,7 @@ def test_an_f_that_depends_on_time_agrees_with_dop853():
     rate = right_hand_side("l1", gains, lambda t, x: drift(x) + np.array([np.sin(3 * t), 0.5 * t]))
     case = problem("l1", horizon=1.0, model=model, gains=gains)
     expected = dop853(rate, np.concatenate([START[0], np.zeros(4)]), case.times)
-    found = integrate(case, START, Disturbance.from_expressions(wavy_h(), model, 1), tolerance=1e-5)
+    found = alone(case, START, Disturbance.from_expressions(wavy_h(), model, 1), tolerance=1e-5)
     assert not found.failures
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-5

@@ -10,11 +10,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from simulated import alone
 from systems import F_TWO, W_TWO, matrix_of, plain_model
 
 from tubecert.expression import cos, sin, symbol
 from tubecert.model import ControlAffineModel
-from tubecert.simulate.integrator import integrate
 from tubecert.simulate.problem import Disturbance, LoopGains, LoopProblem
 from tubecert.spec import Knots
 from tubecert.trajectory.pieces import piecewise_plan
@@ -206,7 +206,7 @@ def compared(case, loop, inputs, *, span, K, tolerance=1e-5):
     )
     start = knots[1][0] + np.linspace(0.2, -0.1, len(case.B))
     disturbance = Disturbance.from_expressions(case.h_terms, case.model, 1)
-    found = integrate(problem, start[None], disturbance, tolerance=tolerance)
+    found = alone(problem, start[None], disturbance, tolerance=tolerance)
     assert not found.failures
     assert found.error[0] <= 5 * tolerance
     return found, Reference(case, controller, gains, knots).run(start, times)
@@ -269,3 +269,33 @@ def test_tolerances_are_kept_where_inputs_jump():
     for tolerance in (1e-3, 1e-5):
         found, expected = compared(ONE_INPUT, ("l1", L1), JUMPS, span=0.13, K=8, tolerance=tolerance)
         assert np.abs(found.x[0] - expected[:, :2]).max() <= max(found.error[0], 1e-9)
+
+
+@pytest.mark.slow
+def test_no_run_of_a_sliding_estimate_is_further_off_than_it_tells():
+    """20 runs of one vector, from starts of their own, to the accuracy that campaigns ask for."""
+    gains = LoopGains(bandwidth=10.0, projection_radius=RADIUS, predictor_gain=2.0, adaptation_rate=300.0)
+    knots = course(TWO_INPUTS, PAIRS[:2], 0.4)
+    times = np.linspace(0, 0.8, 5)
+    problem = LoopProblem(
+        model=TWO_INPUTS.model,
+        plan=planned(TWO_INPUTS, *knots),
+        controller="l1",
+        horizon=0.8,
+        times=times,
+        gains=gains,
+    )
+    starts = knots[1][0] + np.random.default_rng(1).uniform(-0.4, 0.4, (20, 3))
+    found = alone(
+        problem,
+        starts,
+        Disturbance.from_expressions(TWO_INPUTS.h_terms, TWO_INPUTS.model, 20),
+        tolerance=1e-3,
+    )
+    slid = 0
+    for lane, start in enumerate(starts):
+        expected = Reference(TWO_INPUTS, "l1", gains, knots).run(start, times)
+        wrong = np.linalg.norm(found.x[lane] - expected[:, :3], axis=1).max()
+        assert wrong <= found.error[lane] <= 5e-3
+        slid += np.linalg.norm(found.sigma_hat[lane, 1:], axis=1).max() > RADIUS * (1 - 1e-9)
+    assert slid == 20

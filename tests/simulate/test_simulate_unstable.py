@@ -5,14 +5,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from simulated import alone, setting
 from simulated import runs as runs_by_hand
-from simulated import setting
 from systems import matrix_of, plain_model
 
 from tubecert.expression import exp, symbol
 from tubecert.report.simulation import report, verdict_line
 from tubecert.simulate.campaign import SPECIFIED, Campaign, Drawn, simulate
-from tubecert.simulate.integrator import integrate
 from tubecert.simulate.judge import compare
 from tubecert.simulate.problem import Disturbance, LoopProblem
 from tubecert.simulate.record import summary
@@ -38,7 +37,7 @@ def loop(*, horizon=6.0, limit=np.inf):
 
 def run(problem, start=(0.1, 0.0)):
     h = Disturbance.from_expressions((exp(3 * T),), problem.model, 1)
-    return integrate(problem, np.array([start]), h, tolerance=1e-3)
+    return alone(problem, np.array([start]), h, tolerance=1e-3)
 
 
 @pytest.mark.slow

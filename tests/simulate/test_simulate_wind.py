@@ -7,13 +7,12 @@ import numpy as np
 import proven
 import pytest
 from scipy.integrate import solve_ivp
-from simulated import FLAT
+from simulated import FLAT, alone
 from systems import SMALL
 
 from tubecert.simulate import engine
 from tubecert.simulate.attack import cases
 from tubecert.simulate.campaign import simulate
-from tubecert.simulate.integrator import integrate
 from tubecert.simulate.judge import compare
 from tubecert.simulate.problem import Disturbance
 from tubecert.simulate.setting import Choice, loop_of, setting_of
@@ -46,7 +45,7 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
     theta = np.array([[0.31, 0.02]])
     moved = replace(still, beside=still.beside._replace(theta=theta))
     x0 = np.array([[0.05, 0.0]])
-    found = integrate(problem, x0, moved, tolerance=1e-5)
+    found = alone(problem, x0, moved, tolerance=1e-5)
     M = np.linalg.inv(np.array([[1, -0.3], [-0.3, 2]]))
     B = np.array([0.0, 1.0])
 
@@ -61,7 +60,7 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
 
     own = solve_ivp(slope, (0, 2), x0[0], rtol=1e-10, atol=1e-12, t_eval=problem.times)
     np.testing.assert_allclose(found.x[0], own.y.T, atol=1e-5)
-    at_rest = integrate(problem, x0, still, tolerance=1e-5)
+    at_rest = alone(problem, x0, still, tolerance=1e-5)
     assert np.abs(at_rest.x - found.x).max() > 1e-3
 
 

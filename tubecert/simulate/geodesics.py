@@ -27,7 +27,7 @@ REASONS: Final = {
     UNRESOLVED: "the geodesic needs a polynomial of a higher degree",
 }
 _EXTRA_NODES: Final = 2
-_LAST: Final = 1e-12  # of the energy: what a step gains that is not taken; covectors are wrong by its root
+_LAST: Final = 1e-11  # of the energy: what a step gains that is not taken; covectors are wrong by its root
 _QUICK: Final = 8  # steps with the constant Hessian
 _MOST: Final = 40  # of Newton's steps
 _HALVINGS: Final = 12

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 
-_CHUNK: Final = 128  # steps whose peaks are taken at once
+_CHUNK: Final = 64  # steps whose peaks are taken at once
 _WEIGHTS: Final = (1.0, 2.0, 2.0, 1.0)
 SHARES: Final = (0.0, 0.5, 0.5, 1.0)  # of a step, stage by stage
 
