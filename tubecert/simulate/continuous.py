@@ -12,6 +12,7 @@ factor methods for stiff PDEs, J. Comput. Phys. 203, 2005.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import log
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -42,7 +43,7 @@ class _Stage(NamedTuple):
 
 
 class _Group(NamedTuple):
-    """Lanes whose fast part is the same, and its flows by the length of the step, where B is constant."""
+    """Lanes whose fast part is the same, and its flows by the logarithm of the step's length, where B is constant."""
 
     lanes: slice
     fast: Fast
@@ -176,7 +177,7 @@ class Continuous:
             B = self._acting.input(t, x + length / 2 * times(B, self._y[self._at.u_a]))
             self._own = [group.fast.flow(B[..., group.lanes], length, level) for group in self._groups]
             return
-        same = float(f"{length:.10g}")
+        same = round(log(length), 10)  # lengths that differ by rounding are one
         for group in self._groups:
             if same not in group.flows:
                 group.flows[same] = group.fast.flow(B, length, level)
