@@ -34,15 +34,6 @@ _HERE: Final = Serial()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sample:
-    """Random runs of a loop and their cases, in the order of their numbers; `asked` is how many there were to be."""
-
-    runs: Runs
-    cases: Cases
-    asked: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawn:
     """One run of a loop that is drawn, and its comparison."""
 
@@ -53,10 +44,14 @@ class Drawn:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Attack:
-    """What random runs and the adversary found against a loop; the adversary's run is alone in `worst` and `case`."""
+    """What random runs, of which so many were `asked` for, and the adversary found against a loop.
+
+    The adversary's run is alone in `worst` and `case`.
+    """
 
     loop: Loop
-    sample: Sample
+    runs: Runs
+    asked: int
     comparison: Comparison
     worst: Runs | None = None
     case: Cases | None = None
@@ -106,7 +101,10 @@ def simulate(
     vectors = [numbers[first : first + LANES] for first in range(0, max(1, len(numbers)), LANES)]
     found = _found(partial(_vector, setting, loops, own, seed), vectors, report, executor)
     parts, complete = [runs[len(runs) - len(tested) :] for runs in found], len(found) == len(vectors)
-    drawn = [_drawn(setting, loop, runs) for loop, runs in zip(loops, found[0], strict=False)]
+    drawn = [
+        Drawn(loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise))
+        for loop, runs in zip(loops, found[0], strict=False)
+    ]
     if setting.h is not None and replay is None:
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
@@ -114,7 +112,8 @@ def simulate(
     lost = [item.loop for item in drawn if item.comparison.no_result]
     attacks = []
     for loop, *sample in zip(tested, *parts, strict=True):
-        attack = _sampled(setting, loop, joined(sample), count, seed)
+        runs = joined(sample)
+        attack = Attack(loop=loop, runs=runs, asked=count, comparison=compare(setting, runs, loop.promise))
         if complete and loop not in lost:
             attack = _attacked(setting, attack, seed, report)
             complete = attack.worst is not None
@@ -176,19 +175,10 @@ def _found(
     return [found[place] for place in takewhile(found.__contains__, range(len(vectors)))]
 
 
-def _drawn(setting: Setting, loop: Loop, runs: Runs) -> Drawn:
-    return Drawn(loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise))
-
-
-def _sampled(setting: Setting, loop: Loop, runs: Runs, count: int, seed: int) -> Attack:
-    sample = Sample(runs=runs, cases=cases(setting, seed, range(runs.lanes)), asked=count)
-    return Attack(loop=loop, sample=sample, comparison=compare(setting, runs, loop.promise))
-
-
 def _attacked(setting: Setting, attack: Attack, seed: int, report: Progress | None) -> Attack:
     """With the adversary's run, if nobody interrupts."""
     try:
-        found = worst(setting, attack.loop, seed, attack.sample.runs, report)
+        found = worst(setting, attack.loop, seed, attack.runs, report)
         (runs,) = integrate([found.of(attack.loop.problem)], tolerance=setting.tolerance)
     except KeyboardInterrupt:
         return attack

@@ -135,7 +135,7 @@ def _monte_carlo(campaign: Campaign) -> Figure | None:
     figure = blank(7.0, 0.8 + 2.8 * len(attacks))
     axes = figure.subplots(len(attacks), 1, sharex=True, squeeze=False)[:, 0]
     for axis, attack in zip(axes, attacks, strict=True):
-        color, runs = COLORS[attack.loop.controller], attack.sample.runs
+        color, runs = COLORS[attack.loop.controller], attack.runs
         share = runs.distance / reach
         alive = ~np.isnan(share).all(axis=0)
         t, share = runs.t[alive], share[:, alive]

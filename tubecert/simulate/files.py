@@ -38,9 +38,9 @@ def _arrays(campaign: Campaign) -> Iterator[tuple[str, Array]]:
     for attack in campaign.attacks:
         if attack.worst is not None:
             yield from _named(f"{attack.loop.controller}_adversary", attack.worst)
-        prefix, runs = f"{attack.loop.controller}_sample", attack.sample.runs
+        prefix, runs = f"{attack.loop.controller}_sample", attack.runs
         yield from ((f"{prefix}_{name}", getattr(runs, name)) for name in ("t", "distance", "x", "error"))
-        yield f"{prefix}_start", attack.sample.cases.start
+        yield f"{prefix}_start", runs.x[:, 0]
         for peak in fields(Worst):
             yield f"{prefix}_largest_{peak.name}", getattr(runs.worst, peak.name).value
 

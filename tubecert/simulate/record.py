@@ -226,7 +226,7 @@ def _attack(item: Attack, setting: Setting) -> AttackData:
     return AttackData(
         loop=LoopData.of(item.loop),
         largest_distance_over_dbar=None if item.greatest is None else item.greatest / setting.reach,
-        random=RandomData(asked=item.sample.asked, comparison=item.comparison),
+        random=RandomData(asked=item.asked, comparison=item.comparison),
         adversary=_adversary(item, setting),
     )
 

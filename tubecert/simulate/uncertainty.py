@@ -49,10 +49,6 @@ class Class:
     push: tuple[float, float] | None = None
     sources: Sources | None = None
 
-    def rate_at(self, speed: float) -> float:
-        """s1 = Dht + Dhx Y, how fast h moves along a loop of the speed Y."""
-        return self.h_t + self.h_x * speed
-
     @property
     def adversary(self) -> int:
         """How many genes describe an adversary."""
