@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from tubecert.certificate import dump, seal
 from tubecert.cli.app import app
+from tubecert.executor import Processes, Serial
 from tubecert.simulate import attack, engine
 from tubecert.simulate import campaign as campaigns
 from tubecert.simulate import figures as drawing
@@ -140,6 +141,19 @@ def test_runs_do_not_depend_on_how_many_there_are_and_how_they_are_grouped(monke
     np.testing.assert_allclose(whole.worst.distance.value[:5], parts.worst.distance.value, **close)
 
 
+@pytest.mark.slow
+def test_processes_find_the_same(monkeypatch, quick):
+    monkeypatch.setattr(campaigns, "LANES", 2)
+    where = setting("flat", duration="1")
+    loops = [loop_of(where, "l1", Choice())]
+    one, two = (
+        campaigns.simulate(where, loops, count=5, seed=5, executor=each).attacks[0].runs
+        for each in (Serial(), Processes(2))
+    )
+    np.testing.assert_array_equal(one.x, two.x)
+    np.testing.assert_array_equal(one.worst.distance.value, two.worst.distance.value)
+
+
 def interrupted_at(monkeypatch, call):
     """The engine is interrupted when it is called for the so-manieth time."""
     real, calls = engine.integrate, []
@@ -219,6 +233,7 @@ def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
         (["--runs", "1.5"], "whole number"),
         (["--runs", "-3"], "-3 is not 0 or more"),
         (["--seed", "x"], "--seed"),
+        (["--jobs", "0"], "--jobs"),
         (["--duration", "9"], "the plan ends at 4 s"),
         (["--certificate", "flat.yaml"], "`tubecert certify flat.yaml` writes one: flat.certificate.json"),
         (["--certificate", "none.json"], "cannot read"),

@@ -18,7 +18,7 @@ from tubecert.cli.settings import settings_of
 from tubecert.errors import ExitCode
 from tubecert.executor import Serial
 from tubecert.libraries import versions
-from tubecert.library.asked import require_nothing_of_a_metric
+from tubecert.library.asked import jobs_of, require_nothing_of_a_metric
 from tubecert.library.simulating import (
     SimulationNumbers,
     campaign_of,
@@ -28,7 +28,7 @@ from tubecert.library.simulating import (
     simulation_numbers,
     wishes_of,
 )
-from tubecert.library.workers import cluster_at
+from tubecert.library.workers import workers_of
 from tubecert.printable import visible
 from tubecert.progress import Phase, Progress, Step
 from tubecert.records import Json
@@ -59,12 +59,13 @@ class Given:
     plan: Path | None
     numbers: Mapping[str, str | None]
     folder: str | None
+    jobs: str
     scheduler: str | None
 
 
 def run(given: Given, output: Output) -> ExitCode:
     """Simulate."""
-    numbers = simulation_numbers(given.numbers, flag)
+    numbers, jobs = simulation_numbers(given.numbers, flag), jobs_of("--jobs", given.jobs)
     radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
     settings = settings_of(given.settings, metric=given.metric, **radii)
     from tubecert import spec
@@ -80,7 +81,7 @@ def run(given: Given, output: Output) -> ExitCode:
         system = with_metric(system, str(given.metric))
     wishes = wishes_of(system, numbers, chosen, given.gains, given.plan)
     folder = _folder(given)
-    executor = Serial() if given.scheduler is None else cluster_at(given.scheduler)
+    executor = workers_of(jobs, given.scheduler, "--scheduler") or Serial()
     from tubecert.campaigns.folder import prepared
     from tubecert.report.simulation import report as report_of
     from tubecert.report.simulation import verdict_line
@@ -115,6 +116,7 @@ def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Out
     from tubecert.report.sampled_simulation import verdict_line
 
     words = {name: getattr(given, name) for name in ("metric", "scheduler", "controllers", "gains", "plan")}
+    words["jobs"] = None if given.jobs == "1" else given.jobs
     require_nothing_of_a_metric({**given.numbers, **words}, flag)
     folder = _folder(given)
     with prepared(folder), telling.shown(Terminal.stderr(color=output.color), output) as report:

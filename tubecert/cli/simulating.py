@@ -62,6 +62,7 @@ def simulate(
         str | None,
         number_option("--runs", "Random runs against each loop that adapts; 0: no attacks.  [100]"),
     ] = None,
+    jobs: Annotated[str, typer.Option(metavar="NUMBER", help="Vectors of 128 runs at a time.")] = "1",
     scheduler: Scheduler = None,
     seed: Annotated[
         str | None, number_option("--seed", "Seed of the random runs and of the adversary.  [0]")
@@ -138,6 +139,7 @@ def simulate(
                 "members": members,
             },
             folder=output,
+            jobs=jobs,
             scheduler=scheduler,
         )
         code = run(given, how)
