@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "machines"))
 
 from machines import Tables, drawn, met
 
+from tubecert.errors import SpecError
 from tubecert.loop_design.certification import certify
 from tubecert.sampled_loop.record import Result, Stage
 from tubecert.spec import load_text
@@ -56,6 +57,8 @@ def main() -> None:
             shares = _shares(seed, result) if result.verdict is Verdict.CERTIFIED else ()
         except SlowError:
             word, told = "slow", f"more than {PATIENCE} s"
+        except SpecError as error:  # B was drawn as 0
+            word, told = "no question", error.findings[0].message
         else:
             word, told = result.verdict.value, " ".join(f"{lack.kind} {lack.where}" for lack in result.lacks)
             if shares:
