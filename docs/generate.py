@@ -366,8 +366,8 @@ def sampled_loop() -> dict[str, Any]:
 
 def specification() -> dict[str, Any]:
     """The schema of specifications, from the table of keys and the words below them."""
-    own = _section_form(FILE)
-    kinds = {f"trajectory_{kind}": _section_form(section) for kind, section in PLANS.items()}
+    own = described_section(FILE)
+    kinds = {f"trajectory_{kind}": described_section(section) for kind, section in PLANS.items()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:tubecert:spec:1",
@@ -377,28 +377,31 @@ def specification() -> dict[str, Any]:
     }
 
 
-def _section_form(section: Section) -> dict[str, Any]:
+def described_section(section: Section) -> dict[str, Any]:
+    """The schema of a section: keys with their words, closed."""
     words = {} if section.make is None else _words(section.make)
     properties = {}
     for name, key in section.keys.items():
         said = key.words or words.get((key.into or name).rpartition(".")[2]) or words.get(name)
-        properties[name] = ({"description": said} if said else {}) | _key_form(key.kind.schema) | key.beside
+        properties[name] = (
+            ({"description": said} if said else {}) | _with_sections(key.kind.schema) | key.beside
+        )
     needed = {"required": list(section.needed)} if section.needed else {}
     described = {"type": "object", "description": section.words, "properties": properties}
     return described | needed | {"additionalProperties": False, **section.form}
 
 
-def _key_form(form: Any) -> Any:
+def _with_sections(form: Any) -> Any:
     """A schema with those of its sections in their places."""
     match form:
         case {"section": section}:
-            return _section_form(section)
+            return described_section(section)
         case {"plans": plans}:
             return _union(plans)
         case dict():
-            return {key: _key_form(value) for key, value in form.items()}
+            return {key: _with_sections(value) for key, value in form.items()}
         case list():
-            return [_key_form(each) for each in form]
+            return [_with_sections(each) for each in form]
     return form
 
 

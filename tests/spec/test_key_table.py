@@ -3,6 +3,8 @@
 import copy
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,12 @@ import yaml
 import tubecert
 from tubecert.errors import SpecError
 from tubecert.spec import canonical
+from tubecert.spec.document import compose
+from tubecert.spec.keys import key, number, section
 from tubecert.spec.load import load_text
+from tubecert.spec.names import Names
+from tubecert.spec.reader import Reader, root_field
+from tubecert.spec.source import Source
 
 PACKAGE = Path(tubecert.__file__).parent
 SCHEMA = json.loads((PACKAGE / "schemas/spec.schema.json").read_text("utf-8"))
@@ -154,3 +161,45 @@ def test_a_word_that_is_no_choice_is_refused(place):
         assert effective(data, name) is None
         return
     pytest.fail("no file has the section")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Toy:
+    """A toy."""
+
+    share: Fraction | None = key(number(above=0, most=1), None, example=0.1)
+    """A share; > 0."""
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "words"),
+    [
+        ("share: 1/4", None, ""),
+        ("share: 2", (1, 8), "toy.share is 2; it must be > 0 and <= 1"),
+        ("share: 0.1 m", (1, 12), "a number has no unit"),
+        ("shar: 0.1", (1, 1), "did you mean share?"),
+    ],
+)
+def test_a_key_is_one_place(text, place, words):
+    """From one field it is read, refused, compared with misspelt ones, written and described."""
+    source = Source.of("toy.yaml", text)
+    reader, toy = Reader(source), section(Toy)
+    field = replace(root_field(reader, compose(source)[0]), path="toy")
+    found = toy.read(field, Names(states=("x",), inputs=("u",), parameters=()))
+    if place is None:
+        assert found == Toy(share=Fraction(1, 4))
+        assert toy.written(found) == {"share": "0.25"}
+    else:
+        [finding] = reader.findings
+        assert (finding.location.line, finding.location.column) == place
+        assert words in f"{finding.message} / {finding.help}"
+
+
+def test_the_words_of_a_key_stand_below_it(monkeypatch):
+    monkeypatch.syspath_prepend(PACKAGE.parent / "docs")
+    import generate
+
+    described = generate.described_section(section(Toy))
+    assert described["description"] == "A toy."
+    said = {"description": "A share; > 0.", "$ref": "#/$defs/number", "examples": [0.1]}
+    assert described["properties"] == {"share": said}
