@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, Final, Literal, TypeAlias
 
 from tubecert.errors import SpecError
@@ -127,35 +128,26 @@ _FORM: Final[dict[str, Any]] = {
 FILE: Final = section(File, **_FORM)
 
 
-def load(path: str, settings: Sequence[Setting] = ()) -> Spec:
+def load(path: str, settings: Sequence[Setting] = (), reads: Reads = "whole") -> Spec:
     """The specification in a file, with the keys that are set in place of its own.
 
     Raises `TargetError` if the file cannot be read and `SpecError` with every problem, in the order of the
     file; that it asks about a metric alone is one.
     """
-    return load_source(read_source(path), settings)
+    return load_source(read_source(path), settings, reads)
 
 
-def load_question(path: str, settings: Sequence[Setting] = ()) -> Spec:
-    """The same, also of a file that asks about a metric alone: `Spec.lacks` says so. Raises as `load` does."""
-    return load_source(read_source(path), settings, "question")
+load_question: Final = partial(load, reads="question")
+"""The same, also of a file that asks about a metric alone: `Spec.lacks` says so."""
+load_system: Final = partial(load, reads="system")
+"""The same of a file of which only system, safe set and metric matter: it may lack all else, which is not read.
 
+The specification is that of rest in the middle of the safe set without uncertainty."""
+load_plant: Final = partial(load, reads="plant")
+"""The specification in a file that may lack `uncertainty` and `trajectory`: a metric alone can be asked for then.
 
-def load_system(path: str, settings: Sequence[Setting] = ()) -> Spec:
-    """The same of a file of which only system, safe set and metric matter: it may lack all else, which is not read.
-
-    The specification is that of rest in the middle of the safe set without uncertainty. Raises as `load` does.
-    """
-    return load_source(read_source(path), settings, "system")
-
-
-def load_plant(path: str, settings: Sequence[Setting] = ()) -> Spec:
-    """The specification in a file that may lack `uncertainty` and `trajectory`: a metric alone can be asked for then.
-
-    Of one that lacks either, `Spec.lacks` says what, and system, safe set, metric and tube are read; the rest is as
-    `load_system` leaves it. Raises as `load` does.
-    """
-    return load_source(read_source(path), settings, "plant")
+Of one that lacks either, `Spec.lacks` says what, and system, safe set, metric and tube are read; the rest is as
+`load_system` leaves it."""
 
 
 def load_text(text: str, file: str = "<text>", reads: Reads = "whole") -> Spec:

@@ -183,8 +183,7 @@ class Bundle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory:
-    """The plan x*(t), u*(t). It need not satisfy the dynamics exactly: by how much it misses them is bounded, and
-    treated as a disturbance. Needed, but for a question about a metric alone.
+    """The plan: horizon in s, and what its kind needs.
 
     x (n) and u (m) are expressions of t (constants for an equilibrium); csv has a `table`, ilqr a `task`, any
     a `bundle` instead. `afterwards`: what a computer does when the horizon is over, of which the tube holds as well.
