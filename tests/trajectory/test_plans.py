@@ -13,15 +13,17 @@ from strategies import fractions
 from systems import SMALL, plain_model
 
 from tubecert.certificate import seal
+from tubecert.checking.cache import key_of_system
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import SumOfNorms, Target
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.errors import SpecError
-from tubecert.expression import constant, cos, sin, symbol
+from tubecert.expression import constant, cos, number_text, sin, symbol
 from tubecert.expression.matrix import column
-from tubecert.pipeline import Options, certify
-from tubecert.spec import Knots, load, load_text
+from tubecert.findings import Severity
+from tubecert.pipeline import Options, certify, inspect
+from tubecert.spec import Knots, canonical, load, load_text
 from tubecert.spec.table import MAX_ROWS
 from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import TAU, piecewise_plan
@@ -363,6 +365,69 @@ def test_a_plan_file_is_read_exactly(tmp_path, text):
     assert data.x == ((1, 0), (Fraction(9, 10), Fraction(1, 20)))
     assert data.u == ((Fraction(1, 2),), (Fraction(-1, 10),))
     assert data.interpolation == "linear"
+
+
+SOLVED = [
+    ("t,p,q,u\n0,1,0,0.5\n0.1,0.9,0.05,-0.1\n0.2,1,1,\n", ""),
+    ("t,p,q,u\n0,1,0,0.5\n0.1,0.9,0.05,-0.1\n0.2,1,1\n\n", ""),
+    ("t,p,q,u\n12.5,1,0,0.5\n12.6,0.9,0.05,-0.1\n12.7,1,1,NaN\n", ""),
+    (
+        ",ms,x[0],q,x_1,u,status\n7,20,1000,50,0,-1,ok\n8,120,900,50,0.05,.2,ok\n9,220,1000,50,1,nan,ok\n",
+        ", columns: {t: {name: ms, scale: 1/1000}, p: {name: 'x[0]', scale: 1/1000}, q: x_1, u: {scale: -1/2}}",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "more"), SOLVED, ids=["empty", "absent", "nan, later", "named and scaled"])
+def test_plans_of_solvers_are_read_as_they_are_written(tmp_path, text, more):
+    data = table_of(written(tmp_path, text, more)).knots
+    assert data.t == (0, Fraction(1, 10), Fraction(1, 5))
+    assert data.x == ((1, 0), (Fraction(9, 10), Fraction(1, 20)), (1, 1))
+    assert data.u == ((Fraction(1, 2),), (Fraction(-1, 10),), (Fraction(-1, 10),))
+
+
+def test_columns_are_no_part_of_what_is_proven(tmp_path):
+    text, more = SOLVED[-1]
+    named, plain = load(str(written(tmp_path, text, more))), load(str(written(tmp_path, SOLVED[0][0])))
+    assert canonical(named) == canonical(plain)
+    turned = load(str(written(tmp_path, text, more.replace("-1/2", "1/2"))))
+    assert canonical(turned) == canonical(plain)
+    ask = Fraction(1, 100), 100
+    assert key_of_system(turned, *ask) != key_of_system(named, *ask)  # the same bytes are another plan
+
+
+def test_degrees_of_a_plan_are_decimals(tmp_path):
+    text = "t,p,q,u\n0,180,0,0\n1,1,0,0\n"
+    data = table_of(written(tmp_path, text, ", columns: {p: {scale: 1 deg}}")).knots
+    assert [number_text(row[0]) for row in data.x] == ["3.14159265358979323846", "0.0174532925199432957692"]
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "words"),
+    [
+        ("t,p,q,u\n0,1,0,\n1,1,0,0\n", "", "a number is missing"),
+        ("t,p,q,u\n0,1,0,0\n1,1,,0\n", "", "a number is missing"),
+        ("t,p,q,u\n0,1,0,0\n1,1\n", "", "the row has 2 cells"),
+        ("t,p,q,u\n0,1,0,0\n1,1e-299,0,0\n", ", columns: {p: {scale: 1e-9}}", "nearer to 0 than 1e-300"),
+        ("t,p,v,u\n0,1,0,0\n1,1,0,0\n", ", columns: {}", "lacks a column q"),
+        (
+            "user,name,secret,more\na,b,c,d\n",
+            ", columns: {t: user, p: name, q: secret, u: more}",
+            "this cell",
+        ),
+    ],
+)
+def test_what_is_missing_elsewhere_is_a_finding(tmp_path, text, more, words):
+    with pytest.raises(SpecError, match=words) as caught:
+        load(str(written(tmp_path, text, more)))
+    assert not any(item.location and "a,b,c" in item.location.source for item in caught.value.findings)
+
+
+def test_a_plan_that_begins_later_is_told(tmp_path):
+    path = written(tmp_path, "t,p,q,u\n12.5,0,0,0\n13,0,0,0\n")
+    (note,) = [item for item in inspect(load(str(path))) if item.code == "TC119"]
+    assert (note.severity, str(note.location)) == (Severity.NOTE, f"{tmp_path / 'plan.csv'}:2:1")
+    assert "begins at t = 12.5 s" in note.message
 
 
 def test_the_file_is_found_beside_its_specification_and_its_bytes_are_hashed(tmp_path, monkeypatch):

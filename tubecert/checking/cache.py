@@ -44,7 +44,8 @@ def key_of_system(spec: Spec, gap: Fraction, budget: int) -> str:
 
 
 def _plan_file(spec: Spec) -> str:
-    return "" if spec.trajectory.table is None else spec.trajectory.table.sha256
+    """The knots: of the same bytes `columns` may make others."""
+    return "" if spec.trajectory.table is None else repr(spec.trajectory.table.knots)
 
 
 def _key(content: Any) -> str:

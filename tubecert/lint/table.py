@@ -15,11 +15,13 @@ import numpy as np
 from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
+from tubecert.expression import number_text
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import codes
 from tubecert.lint.floats import floats, nearest
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.spec import Spec, Table
+from tubecert.spec.codes import PLAN_TIMES
 
 _FALLS: Final = 0.05  # to which share of it a defect falls where its cause is found
 _STANDS_OUT: Final = 20  # times the defect of most pieces: a row that does not belong
@@ -71,6 +73,14 @@ def paid(spec: Spec) -> str:
 def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: float) -> Iterator[Finding]:
     """What is amiss with a plan file that can be read; `radius` is that of the least tube."""
     knots = table.knots
+    if table.begins:
+        yield Finding(
+            code=PLAN_TIMES,
+            severity=Severity.NOTE,
+            message=f"the plan begins at t = {number_text(table.begins)[:40]} s, which is t = 0 from here on",
+            location=table.rows[0],
+            help="horizon, h and every t of the certificate count from there",
+        )
     rows = np.array([*map(floats, knots.u)])
     each = 2 if knots.interpolation == "hermite-simpson" else 1
     points = _Points(
@@ -127,7 +137,7 @@ def _time_unit(table: Table, points: _Points, dynamics: _Dynamics, worst: float)
         f"the times seem to be in {unit}: the plan misses x*' = f + B u* by {near(worst, 3)}, "
         f"and by {near(other, 3)} with t divided by {near(factor)}",
         table.header,
-        "give t in s",
+        f"give t in s, or trajectory.columns: {{t: {{scale: 1/{near(factor)}}}}}",
     )
 
 

@@ -47,6 +47,6 @@ CODES: Final[Mapping[str, str]] = {
     SYMMETRY: "the dual metric is not symmetric",
     STABILITY: "the predictor matrix A_m does not suit P = I",
     PLAN_COLUMNS: "a plan file is not a table of t, the states and the inputs",
-    PLAN_TIMES: "the times of a plan file do not increase from 0 to the horizon",
+    PLAN_TIMES: "the times of a plan file do not increase, or not from 0 to the horizon",
     TABLE: "a table of a function is not rows of x and y with increasing x",
 }

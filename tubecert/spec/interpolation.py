@@ -78,7 +78,7 @@ def _solved(rows: Sequence[tuple[Fraction, Fraction, Fraction, Fraction]]) -> li
     for before, own, after, right in rows:
         share, value = passed[-1] if passed else (Fraction(0), Fraction(0))
         pivot = own - before * share
-        passed.append((_rounded(after / pivot, _INNER), _rounded((right - before * value) / pivot, _INNER)))
+        passed.append((rounded(after / pivot, _INNER), rounded((right - before * value) / pivot, _INNER)))
     found: list[Fraction] = []
     for share, value in reversed(passed):
         found.append(value - share * found[-1] if found else value)
@@ -86,10 +86,10 @@ def _solved(rows: Sequence[tuple[Fraction, Fraction, Fraction, Fraction]]) -> li
 
 
 def _shortened(slopes: Numbers) -> tuple[Fraction, ...]:
-    return tuple(_rounded(slope, DIGITS) for slope in slopes)
+    return tuple(rounded(slope, DIGITS) for slope in slopes)
 
 
-def _rounded(q: Fraction, digits: int) -> Fraction:
+def rounded(q: Fraction, digits: int) -> Fraction:
     """A decimal of about so many digits, towards 0."""
     if not q:
         return q

@@ -127,15 +127,8 @@ def _read(sheet: Sheet, width: int) -> list[Row]:
 
 
 def _numbers(sheet: Sheet, cells: Sequence[Cell]) -> Row | None:
-    if not sheet.shown:
-        strange = [cell for cell in cells if not is_decimal(cell)]
-        for cell in strange:  # of a file that may be something else no text is shown
-            sheet.fail(
-                cell, codes.NUMBER, "this cell is not a decimal number", "a row is x,y in plain decimals"
-            )
-        if strange:
-            return None
-    found = [value for value in (number(sheet, cell) for cell in cells) if value is not None]
+    help = "a row is x,y in plain decimals"
+    found = [value for value in (number(sheet, cell, help) for cell in cells) if value is not None]
     return found if len(found) == len(cells) else None
 
 

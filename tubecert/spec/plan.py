@@ -15,7 +15,7 @@ from tubecert.spec.keys import SIZE, Kind, each, entry, expressions, form, key, 
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
 from tubecert.spec.system import Uncertainty, no_uncertainty
-from tubecert.spec.table import read_table
+from tubecert.spec.table import COLUMNS, read_table
 from tubecert.spec.values import Ends, Interpolation, Matrix, Table, Term, Vector
 
 PlanKind = Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
@@ -249,7 +249,15 @@ class FromFile:
     kind = _kind("csv")
     """Knots from a file."""
     file = entry(form({"type": "string"}), "table.file", needed=True, late=True, example="plan.csv")
-    """CSV file with a header that names t, every state and every input; relative to the folder of the specification."""
+    """CSV file with a header that names t, every state and every input; relative to the folder of the specification.
+    Its first time becomes t = 0; in its last row inputs may be left out: they stay as in the row before it."""
+    columns = entry(
+        COLUMNS,
+        "",
+        example={"t": {"name": "time_ms", "scale": "1/1000"}, "q": {"scale": "1 deg"}, "u": "u_0"},
+    )
+    """Columns of the file that have another name than t, a state or an input, or another unit: its name, or name and
+    scale. With it, {} as well, columns that are not needed are skipped."""
     interpolation = entry(word(*get_args(Interpolation)), "table.knots.interpolation", said="linear")
     """What u* does between knots; hermite-simpson: rows are in turn a knot and the point between it and the next, u* is
     quadratic through the three."""
@@ -297,9 +305,9 @@ def read_trajectory(field: Field, names: Names) -> Trajectory | None:
 
 def _table(entries: Mapping[str, Field], values: Mapping[str, Any], names: Names) -> dict[str, Any] | None:
     """The table of a file, and how long it lasts."""
-    if "file" not in entries:
+    if "file" not in entries or ("columns" in entries and "columns" not in values):
         return None
-    table = read_table(entries["file"], names, values.get("interpolation", "linear"))
+    table = read_table(entries["file"], values.get("columns"), names, values.get("interpolation", "linear"))
     if table is None:
         return None
     last, horizon = table.knots.t[-1], values.get("horizon")

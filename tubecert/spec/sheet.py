@@ -129,8 +129,11 @@ def is_decimal(cell: Cell) -> bool:
     return _DECIMAL.fullmatch(cell.text) is not None
 
 
-def number(sheet: Sheet, cell: Cell) -> Fraction | None:
-    """The number that a cell is; what is none is a finding."""
+def number(sheet: Sheet, cell: Cell, help: str = "") -> Fraction | None:
+    """The number that a cell is; what is none is a finding, with `help` and no text if the sheet may be anything."""
+    if not sheet.shown and not is_decimal(cell):
+        sheet.fail(cell, codes.NUMBER, "this cell is not a decimal number", help)
+        return None
     match = _DECIMAL.fullmatch(cell.text)
     if match and len(cell.text) <= MAX_NUMBER_LENGTH and abs(int(match[1] or 0)) <= MAX_NUMBER_EXPONENT:
         value = Fraction(cell.text)
@@ -138,11 +141,13 @@ def number(sheet: Sheet, cell: Cell) -> Fraction | None:
             sheet.fail(cell, codes.LIMIT, f"{cell.text[:40]} is {extreme}", MODERATE)
             return None
         return value
-    code, message, help = codes.NUMBER, f"{cell.text[:40]!r} is not a decimal number", ""
+    code, message = codes.NUMBER, f"{cell.text[:40]!r} is not a decimal number"
     try:
         parse_number(cell.text)
     except ExpressionError as error:
         code = codes.LIMIT if error.kind == "limit" else codes.NUMBER
         message, help = error.message, error.help
+        if cell.text.lower() == "nan":
+            help = "give the value, or leave the row out"
     sheet.fail(cell, code, message, help)
     return None

@@ -1,7 +1,9 @@
 """A plan file (CSV): text -> exact knots, or every problem of the file as located findings.
 
-The first line names the columns: t, every state and every input, in any order. Each further line is a knot; times
-begin at 0 and increase. Numbers are read exactly from their text.
+The first line names the columns: t, every state and every input, in any order; `columns` may give them other names and
+a factor, and then others are skipped. Each further line is a knot; times increase, and the first one becomes 0. Numbers
+are read exactly from their text; times a factor they are decimals of `DIGITS` digits. The last row may lack inputs, as
+plans of N inputs for N + 1 states do: they stay as in the row before it.
 
 A specification may come from a stranger and name any file that its reader may read. So nothing of a file is shown that
 is not a plan: names of columns if one of them is wanted, lines of numbers below a header that is complete.
@@ -11,92 +13,155 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final
+from typing import Final, TypeAlias
 
 from tubecert.expression import suggestion
 from tubecert.findings import capped
-from tubecert.spec import codes
+from tubecert.spec import codes, keys
+from tubecert.spec.document import Scalar
+from tubecert.spec.interpolation import DIGITS, rounded
+from tubecert.spec.keys import key, section
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
+from tubecert.spec.scope import MODERATE, out_of_range
 from tubecert.spec.sheet import ENOUGH, Cell, Sheet, number, opened, rows
 from tubecert.spec.values import Interpolation, Knots, Table
 
 MAX_ROWS: Final = 10_001
-_COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}", re.ASCII)
+_COLUMN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}", re.ASCII)
+_ABSENT: Final = ("", "nan")
 
 
-def read_table(entry: Field, names: Names, interpolation: Interpolation) -> Table | None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """Where t, a state or an input stands in a plan file, and in which unit."""
+
+    name: str = key(keys.Kind(lambda own, _: own.text("the name of a column"), {"type": "string"}), "")
+    """Its name in the first line; by default its own."""
+    scale: Fraction = key(keys.number(), Fraction(1), example="1/1000")
+    """What its numbers are multiplied by: 1/1000 for ms, 1 deg for degrees."""
+
+
+Columns: TypeAlias = Mapping[str, Column]
+
+_COLUMN: Final = section(Column)
+_ITSELF: Final = Column()
+
+
+def _read_columns(field: Field, names: Names) -> dict[str, Column] | None:
+    """The columns that are not called as what they hold, or are in another unit."""
+    fields = field.mapping(optional=_variables(names)) or {}
+    found = {name: _read_column(own, names) for name, own in fields.items()}
+    sound = {name: column for name, column in found.items() if column is not None}
+    called = [_called(name, sound) for name in _variables(names)]
+    twice = [name for name in sound if called.count(_called(name, sound)) > 1]
+    if twice:
+        message = f"the column {_called(twice[0], sound)[:60]} would be that of two"
+        fields[twice[0]].fail(codes.NAME, message, "every one has a column of its own")
+    return sound if len(sound) == len(found) and not twice else None
+
+
+def _read_column(field: Field, names: Names) -> Column | None:
+    if isinstance(field.node, Scalar):
+        return Column(name=field.node.text)
+    found: Column | None = _COLUMN.read(field, names)
+    return found
+
+
+def _called(name: str, columns: Columns) -> str:
+    """The name of a column in the file."""
+    return columns.get(name, _ITSELF).name or name
+
+
+COLUMNS: Final = keys.Kind(
+    _read_columns,
+    {"type": "object", "additionalProperties": {"anyOf": [{"type": "string"}, {"section": _COLUMN}]}},
+)
+
+
+def read_table(
+    entry: Field, columns: Columns | None, names: Names, interpolation: Interpolation
+) -> Table | None:
     """The plan file that a specification names, relative to the specification's own folder."""
     file = opened(entry)
     if file is None:
         return None
     sheet = file.sheet
-    knots = _read(sheet, names, interpolation)
+    found = _rows(sheet, columns, names)
+    knots = None if found is None else _knots(sheet, found, len(names.states), interpolation)
     entry.reader.findings.extend(capped(sheet.findings, codes.LIMIT, ENOUGH))
-    if knots is None or sheet.findings:
+    if found is None or knots is None or sheet.findings:
         return None
-    header, *rows = sheet.lines
+    header, *lines = sheet.lines
     return Table(
         file=file.name,
         sha256=hashlib.sha256(file.data).hexdigest(),
         knots=knots,
+        begins=found[0][0],
         header=header,
-        rows=tuple(rows),
+        rows=tuple(lines),
     )
 
 
-def _read(sheet: Sheet, names: Names, interpolation: Interpolation) -> Knots | None:
+def _rows(sheet: Sheet, columns: Columns | None, names: Names) -> list[list[Fraction]] | None:
+    """The rows as t, states, inputs."""
     lines = rows(sheet, "a plan")
     header = next(lines, None)
+    variables = _variables(names)
+    wanted = tuple(_called(name, columns or {}) for name in variables)
     if sheet.findings:
         return None
     if header is None:
         message = "the plan file is empty"
-        sheet.fail(Cell(text="", line=0, column=0), codes.PLAN_COLUMNS, message, _wanted(names))
+        sheet.fail(Cell(text="", line=0, column=0), codes.PLAN_COLUMNS, message, _wanted(wanted))
         return None
-    columns = _columns(sheet, header, names)
-    if columns is None:
+    places = _columns(sheet, header, wanted, others=columns is not None)
+    if places is None:
         return None
     sheet.note(header)
+    scales = [(columns or {}).get(name, _ITSELF).scale for name in variables]
+    reader = _Rows(sheet, len(header), places, scales, inputs=len(names.inputs))
     values: list[list[Fraction]] = []
     for row in lines:
         if len(values) == MAX_ROWS:
             sheet.fail(row[0], codes.LIMIT, f"a plan has at most {MAX_ROWS:,} rows", "give every second knot")
             return None
-        numbers = _numbers(sheet, row, len(header))
+        numbers = reader.numbers(row, values[-1] if values else None)
         if numbers is not None:
-            _check_time(
-                sheet, row[columns[0]], numbers[columns[0]], [line[columns[0]] for line in values[-1:]]
-            )
+            sheet.shown = True
             values.append(numbers)
             sheet.note(row)
         if len(sheet.findings) >= ENOUGH:
             return None
-    if sheet.findings:
-        return None
-    if len(values) < 2:
-        last = header[0] if not values else Cell(text="", line=len(sheet.source.lines) - 1, column=0)
+    if len(values) < 2 and not sheet.findings:
+        last = header[0] if not values else _end(sheet)
         sheet.fail(last, codes.PLAN_TIMES, f"a plan needs 2 rows or more below its header, not {len(values)}")
-        return None
+    return None if sheet.findings else values
+
+
+def _knots(sheet: Sheet, values: list[list[Fraction]], n: int, interpolation: Interpolation) -> Knots | None:
     if interpolation == "hermite-simpson" and len(values) % 2 == 0:
-        last = Cell(text="", line=len(sheet.source.lines) - 1, column=0)
         message = f"hermite-simpson needs an odd number of rows, not {len(values)}"
         help = "rows are in turn a knot and the point between it and the next knot"
-        sheet.fail(last, codes.PLAN_TIMES, message, help)
+        sheet.fail(_end(sheet), codes.PLAN_TIMES, message, help)
         return None
-    n = len(names.states)
     return Knots(
-        t=tuple(row[columns[0]] for row in values),
-        x=tuple(tuple(row[c] for c in columns[1 : n + 1]) for row in values),
-        u=tuple(tuple(row[c] for c in columns[n + 1 :]) for row in values),
+        t=tuple(row[0] - values[0][0] for row in values),
+        x=tuple(tuple(row[1 : n + 1]) for row in values),
+        u=tuple(tuple(row[n + 1 :]) for row in values),
         interpolation=interpolation,
     )
 
 
-def _columns(sheet: Sheet, header: list[Cell], names: Names) -> list[int] | None:
-    """Where t, the states and the inputs stand."""
-    wanted = (TIME, *names.states, *names.inputs)
+def _end(sheet: Sheet) -> Cell:
+    return Cell(text="", line=len(sheet.source.lines) - 1, column=0)
+
+
+def _columns(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, others: bool) -> list[int] | None:
+    """Where t, the states and the inputs stand, perhaps among others."""
     if header[0].text.startswith("#"):  # as numpy.savetxt writes it
         bare = header[0].text.lstrip("# \t")
         moved = header[0].column + len(header[0].text) - len(bare)
@@ -109,58 +174,93 @@ def _columns(sheet: Sheet, header: list[Cell], names: Names) -> list[int] | None
             Cell(text="", line=header[0].line, column=0),
             codes.PLAN_COLUMNS,
             message,
-            f"separate columns by commas; {_wanted(names)}" if commas else _wanted(names),
+            f"separate columns by commas; {_wanted(wanted)}" if commas else _wanted(wanted),
         )
         return None
-    sheet.shown = all(_COLUMN.fullmatch(cell.text) for cell in header)
-    place = _placed(sheet, header, wanted)
+    # of columns with names that a stranger chose nothing is shown before a row of numbers
+    sheet.shown = not others and all(_COLUMN_NAME.fullmatch(cell.text) for cell in header)
+    place = _placed(sheet, header, wanted, others=others)
     missing = [name for name in wanted if name not in place]
     if missing and not sheet.findings:
         message = f"the plan file lacks {'a column' if len(missing) == 1 else 'columns'} {', '.join(missing)}"
-        sheet.fail(header[0], codes.PLAN_COLUMNS, message, _wanted(names))
+        sheet.fail(header[0], codes.PLAN_COLUMNS, message, _wanted(wanted))
     return None if sheet.findings else [place[name] for name in wanted]
 
 
-def _placed(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...]) -> dict[str, int]:
-    """The columns by name; those that are not wanted, or occur twice, are findings."""
+def _placed(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, others: bool) -> dict[str, int]:
+    """The columns by name; those that occur twice are findings, and so are those not wanted without `others`."""
     place: dict[str, int] = {}
     for index, cell in enumerate(header):
         if cell.text in place:
             sheet.fail(cell, codes.PLAN_COLUMNS, f"the column {cell.text} occurs twice", "keep one")
         elif cell.text in wanted:
             place[cell.text] = index
-        else:
-            said = f"{cell.text!r}" if _COLUMN.fullmatch(cell.text) else f"the name of column {index + 1}"
+        elif not others:
+            said = (
+                f"{cell.text!r}" if _COLUMN_NAME.fullmatch(cell.text) else f"the name of column {index + 1}"
+            )
             message = f"{said} is neither t nor a state nor an input"
-            help = suggestion(cell.text, wanted, what="columns") if sheet.shown else _wanted_of(wanted)
-            sheet.fail(cell, codes.PLAN_COLUMNS, message, help)
+            help = suggestion(cell.text, wanted, what="columns") if sheet.shown else _wanted(wanted)
+            sheet.fail(
+                cell,
+                codes.PLAN_COLUMNS,
+                message,
+                f"{help}; trajectory.columns names columns, and skips others",
+            )
     return place
 
 
-def _wanted(names: Names) -> str:
-    return _wanted_of((TIME, *names.states, *names.inputs))
+def _variables(names: Names) -> tuple[str, ...]:
+    return (TIME, *names.states, *names.inputs)
 
 
-def _wanted_of(columns: tuple[str, ...]) -> str:
+def _wanted(columns: tuple[str, ...]) -> str:
     return f"the first line names the columns: {','.join(columns)}"
 
 
-def _numbers(sheet: Sheet, row: list[Cell], width: int) -> list[Fraction] | None:
-    """The numbers of a row; another number of cells than in the header is a finding."""
-    if len(row) != width:
-        count = "1 cell" if len(row) == 1 else f"{len(row)} cells"
-        where = row[-1] if len(row) < width else row[width]
-        sheet.fail(where, codes.PLAN_COLUMNS, f"the row has {count}; the header names {width} columns")
-        return None
-    numbers = [number(sheet, cell) for cell in row]
-    kept = [number for number in numbers if number is not None]
-    return kept if len(kept) == width else None
+class _Rows:
+    """Rows of cells as numbers: where t, the states and the inputs stand, and what their numbers are multiplied by."""
 
+    def __init__(
+        self, sheet: Sheet, width: int, places: list[int], scales: list[Fraction], *, inputs: int
+    ) -> None:
+        self.sheet, self.width, self.inputs = sheet, width, inputs
+        self.columns = tuple(zip(places, scales, strict=True))
+        self.last = max((k for k, line in enumerate(sheet.source.lines) if line.strip()), default=0)
 
-def _check_time(sheet: Sheet, cell: Cell, t: Fraction, before: list[Fraction]) -> None:
-    """Times begin at 0 and increase."""
-    if not before and t != 0:
-        sheet.fail(cell, codes.PLAN_TIMES, f"the plan begins at t = {cell.text}, not at 0", "shift the times")
-    elif before and t <= before[0]:
-        message = f"t = {cell.text} does not lie after the time before it"
-        sheet.fail(cell, codes.PLAN_TIMES, message, "times must increase from row to row")
+    def numbers(self, row: list[Cell], before: list[Fraction] | None) -> list[Fraction] | None:
+        """The numbers of a row, whose time lies after the one `before`; in the last one inputs may be absent."""
+        kept = len(self.columns) - self.inputs
+        ends = before is not None and row[0].line == self.last
+        if ends and len(row) > max(place for place, _ in self.columns[:kept]):
+            row = row + [replace(row[-1], text="")] * (self.width - len(row))
+        if len(row) != self.width:
+            count = "1 cell" if len(row) == 1 else f"{len(row)} cells"
+            where = row[-1] if len(row) < self.width else row[self.width]
+            message = f"the row has {count}; the header names {self.width} columns"
+            self.sheet.fail(where, codes.PLAN_COLUMNS, message)
+            return None
+        found: list[Fraction | None] = []
+        for k, (place, scale) in enumerate(self.columns):
+            absent = ends and k >= kept and row[place].text.lower() in _ABSENT
+            found.append(before[k] if absent and before else self._number(row[place], scale))
+        sound = [value for value in found if value is not None]
+        if len(sound) < len(found):
+            return None
+        if before and sound[0] <= before[0]:
+            cell = row[self.columns[0][0]]
+            message = f"t = {cell.text[:40]} does not lie after the time before it"
+            self.sheet.fail(cell, codes.PLAN_TIMES, message, "times must increase from row to row")
+        return sound
+
+    def _number(self, cell: Cell, scale: Fraction) -> Fraction | None:
+        value = number(self.sheet, cell)
+        if value is None or scale == 1:
+            return value
+        scaled = rounded(value * scale, DIGITS)
+        if extreme := out_of_range(scaled):
+            self.sheet.fail(
+                cell, codes.LIMIT, f"{cell.text[:40]} times {float(scale):g} is {extreme}", MODERATE
+            )
+            return None
+        return scaled

@@ -59,11 +59,15 @@ class Knots:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A plan file: its name as written, the hash of its bytes, its knots, where its header and its rows stand."""
+    """A plan file: its name as written, the hash of its bytes, its knots, where its header and its rows stand.
+
+    `begins`: its first time in s, which is t = 0 of the knots.
+    """
 
     file: str
     sha256: str
     knots: Knots = field(repr=False)
+    begins: Fraction = Fraction(0)
     header: Location | None = field(default=None, repr=False, compare=False)
     rows: tuple[Location, ...] = field(default=(), repr=False, compare=False)
 
