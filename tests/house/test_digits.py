@@ -16,7 +16,6 @@ ELSEWHERE = {  # where a format with significant digits stands, and what it make
     "report/comparison.py": "signed differences in percent",
     "report/figures_axes.py": "coordinates of SVG",
     "report/figures_tube.py": "coordinates of SVG, and a place in short",
-    "simulate/grid.py": "steps of the integration",
     "sweep/grid.py": "decimals of a grid",
     "synthesis/": "decimals of a proposal",
 }

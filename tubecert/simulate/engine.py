@@ -22,21 +22,21 @@ _AGREEING: Final = 0.02  # of the horizon: two levels that stop a lane this near
 _LIVED: Final = 16  # steps that a lane must have come: what stops it earlier may be nothing but their length
 _PATIENCE: Final = 2  # levels over which the change of a run must fall to less than half (theory: to 1/256)
 _DOUBTFUL: Final = 5  # the level from which on a run that does not converge is given up
-_DEAR: Final = 2  # the level from which on five tolerances will do
-_ENOUGH: Final = 5.0
+_ENOUGH: Final = 5.0  # tolerances that an error may be told to be: it is mostly far below
 _LUCK: Final = 2.0  # times a change an error may be, where k has kinks ...
 _BEFORE: Final = 1 / 8  # ... and times the change before
-_ESTIMATE: Final = 0.01  # of R_H: what sigma_hat may change
+_ESTIMATE: Final = 0.02  # of R_H, 1 % of what bounds |sigma_hat - h|: what sigma_hat and that peak may change
 
 
 def integrate(batches: Sequence[Batch], *, tolerance: float, level: int | None = None) -> tuple[Runs, ...]:
     """The runs of every batch, all as lanes of one vector, to an error of about `tolerance` in |S x|, P = S'S.
 
-    Batches have the same model and times. A lane that cannot be integrated so far has a larger `error` than asked
-    for, and `unresolved` says from when on; it is given up as soon as halving its steps no longer helps, which is so
-    where the loop itself amplifies every difference. One that diverges or has no geodesic is stopped and listed in
-    `failures`, and the others go on. With a `level` (0: the longest steps) runs are proposals on this level alone,
-    whose error is not known: inf. ValueError for arguments that do not fit.
+    Batches have the same model and times. What is told of a run's error is mostly far above it, and may be five
+    tolerances. A lane that cannot be integrated so far has a larger one, and `unresolved` says from when on; it is
+    given up as soon as halving its steps no longer helps, which is so where the loop itself amplifies every difference.
+    One that diverges or has no geodesic is stopped and listed in `failures`, and the others go on. With a `level` (0:
+    the longest steps) runs are proposals on this level alone, whose error is not known: inf. ValueError for arguments
+    that do not fit.
     """
     if not tolerance > 0:
         raise ValueError("tolerance must be positive")
@@ -118,8 +118,7 @@ class _Lanes:
         beyond = ~(apart <= tolerance)
         first = self.problem.times[np.argmax(beyond, axis=0)]
         self.unresolved[lanes] = np.where(beyond.any(axis=0), first, np.nan)
-        worst = np.maximum(change / tolerance, moved / self.room[lanes])
-        near = (worst <= (_ENOUGH if level >= _DEAR else 1.0)) & (told <= _ENOUGH * tolerance)
+        near = (told <= _ENOUGH * tolerance) & (moved <= self.room[lanes])
         done = np.where(failed, before & agree, near)
         return np.asarray(done | self._hopeless(lanes, level))
 

@@ -28,7 +28,7 @@ from tubecert.simulate.uncertainty import Class, Sources, class_of
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
 
-TIMES: Final = 501  # output times of the loops that are drawn
+TIMES: Final = 251  # output times of the loops that are drawn
 CHOSEN: Final = "chosen, not certified"
 _LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
 _TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
