@@ -123,7 +123,9 @@ def test_the_certified_loop_keeps_to_every_plan():
 
 
 @pytest.mark.slow
-def test_an_interruption_keeps_the_plans_that_were_followed():
+def test_an_interruption_keeps_the_plans_that_were_followed(monkeypatch):
+    monkeypatch.setattr("tubecert.simulate.campaign.PLANS", 2)
+
     def interrupted(drawing, seed, numbers):
         yield from members_of(drawing, seed, numbers[:2])
         raise KeyboardInterrupt

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import takewhile
+from itertools import islice, takewhile
 from typing import Final
 
 import numpy as np
@@ -20,7 +20,7 @@ from tubecert.progress import Phase, Progress, Step
 from tubecert.simulate.attack import Cases, cases, worst
 from tubecert.simulate.engine import integrate
 from tubecert.simulate.judge import Comparison, check_class, compare, merged
-from tubecert.simulate.problem import Disturbance
+from tubecert.simulate.problem import Batch, Disturbance
 from tubecert.simulate.record import FollowedData, LoopData, MembersData
 from tubecert.simulate.runs import Runs, joined
 from tubecert.simulate.setting import Loop, Setting
@@ -28,6 +28,7 @@ from tubecert.simulate.uncertainty import usual
 from tubecert.trajectory import Plan
 
 LANES: Final = 128  # random runs of a vector: they are kept, and told of, when all of them are finished
+PLANS: Final = 25  # random plans whose runs are one vector
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
 _HERE: Final = Serial()
@@ -203,12 +204,12 @@ def follow(
     found, defects = list[list[Comparison]](), list[float]()
     tested = [loop for loop in loops if loop.tested]
     with suppress(KeyboardInterrupt):
-        for number, (plan, defect) in enumerate(plans, start=1):
+        while part := [*islice(plans, PLANS)]:
             if report is not None:
-                name, done = "random plans of the family", (number - 1) * each
+                name, done = "random plans of the family", len(found) * each
                 report(Step(phase=Phase.SIMULATION, name=name, done=done, of=asked * each))
-            found.append(_along(setting.along(plan), tested, seed, each, number))
-            defects.append(defect)
+            found += _along(setting, tested, [plan for plan, _ in part], seed, each, len(found) + 1)
+            defects += [defect for _, defect in part]
     if not found:
         return None
     return MembersData(
@@ -223,11 +224,18 @@ def follow(
     )
 
 
-def _along(setting: Setting, loops: Sequence[Loop], seed: int, each: int, number: int) -> list[Comparison]:
-    """Every loop along a plan by its number; output times are its knots, where steps end anyway."""
-    drawn, plan = cases(setting, seed, range(number * each, (number + 1) * each)), setting.plan
-    times = setting.times if plan.knots is None else np.array(plan.knots.t, dtype=float)
-    problems = [replace(loop.along(plan).problem, times=times) for loop in loops]
-    runs = integrate([drawn.of(problem) for problem in problems], tolerance=setting.tolerance)
-    pairs = zip(loops, runs, strict=True)
-    return [compare(setting, own, loop.promise, (number - 1) * each) for loop, own in pairs]
+def _along(
+    setting: Setting, loops: Sequence[Loop], plans: Sequence[Plan], seed: int, each: int, first: int
+) -> list[list[Comparison]]:
+    """Every loop along every plan, from this number on; output times are knots, where steps end anyway."""
+    knots = plans[0].knots
+    times = setting.times if knots is None else np.array(knots.t, dtype=float)
+    around, batches = list[tuple[Setting, Loop, int]](), list[Batch]()
+    for number, plan in enumerate(plans, first):
+        own = setting.along(plan)
+        drawn = cases(own, seed, range(number * each, (number + 1) * each))
+        around += [(own, loop, (number - 1) * each) for loop in loops]
+        batches += [drawn.of(replace(loop.along(plan).problem, times=times)) for loop in loops]
+    runs = zip(around, integrate(batches, tolerance=setting.tolerance), strict=True)
+    seen = [compare(own, found, loop.promise, start) for (own, loop, start), found in runs]
+    return [seen[place : place + len(loops)] for place in range(0, len(seen), len(loops))]
