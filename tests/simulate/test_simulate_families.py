@@ -101,8 +101,9 @@ def test_plans_differ_and_can_be_repeated():
 
 
 @pytest.mark.slow
-def test_a_family_whose_plans_cannot_be_kept_to_is_told():
-    own = drawing(FAMILY.replace("u: {u: [-1, 1]}", "u: {u: [0.9, 1]}"), 20.0)
+def test_a_family_whose_plans_cannot_be_kept_to_is_told(monkeypatch):
+    monkeypatch.setattr("tubecert.simulate.families._TRIES", 3)
+    own = drawing(FAMILY.replace("u: {u: [-1, 1]}", "u: {u: [0.9, 1]}"), 8.0)
     with pytest.raises(TubecertError, match="no random plan 0 was found"):
         member(own, 0, 0)
 
