@@ -216,6 +216,44 @@ def test_a_rounded_point_is_told_to_be_one():
     assert (finding.severity, "no equilibrium" in finding.message) == (Severity.WARNING, True)
 
 
+TANKS = """
+tubecert: 1
+name: tanks
+system:
+  states: [a, b]
+  inputs: [u]
+  f: ["-0.5*sqrt(a)", "0.5*sqrt(a) - 0.4*sqrt(b)"]
+  B: [[1], [0]]
+safe_set: {a: [1, 5], b: [1, 7]}
+uncertainty: {h: ["0.01*sin(t)"]}
+tube: {epsilon: 0.5, rho_a: 0.1}
+trajectory: {kind: equilibrium, at: [3.18, 4.96], input: [0.892]}
+"""
+
+
+def test_the_equilibrium_near_a_point_is_written_out():
+    """V6: levels of three digits, which no input holds; the point beside them is one to the last digit."""
+    [finding] = [item for item in found(TANKS) if item.code == "TC404"]
+    new = re.search(r"at: \[(.*?), (.*?)\], input: \[(.*?)\]", finding.help)
+    a, b, u = map(float, new.groups())
+    assert abs(a - 3.18) + abs(b - 4.96) < 0.02
+    assert abs(u - 0.5 * a**0.5) + abs(u - 0.4 * b**0.5) < 1e-11
+    again = [
+        item
+        for item in found(TANKS.replace("at: [3.18, 4.96], input: [0.892]", new[0]))
+        if item.code == "TC404"
+    ]
+    assert [item.severity for item in again] in ([], [Severity.NOTE])
+    [finding] = found(changed(("input: [0]", "input: [1]")))
+    assert "write input: [0];" in finding.help  # the point is held, by another input
+
+
+def test_where_there_is_no_equilibrium_none_is_named():
+    text = changed(("[v, ", "[1 + v**2, "))
+    [finding] = [item for item in found(text) if item.code == "TC404"]
+    assert "f(at) + B(at) input = 0" in finding.help
+
+
 def test_the_rate_that_a_point_allows_is_named():
     [finding] = found(changed(("rate: 0.4", "rate: 0.6")))
     assert re.search(r"supports 0\.5 at most", finding.message)

@@ -25,6 +25,7 @@ from tubecert.spec import Obstacle, Spec, Vector
 
 _SAMPLES = 257
 _ROUNDING = 1e-9
+_STEPS, _LEFT = 20, 1e-13  # of Newton's method, and where it ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,16 +204,16 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
+        near_by = _equilibrium(spec, curve, model)
         message = f"|f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)"
         if notable:
             message = f"the point is no equilibrium: {message}"
-            help = f"choose at and input with f(at) + B(at) input = 0; {paid(spec)}"
+            help = f"write {near_by or 'at and input with f(at) + B(at) input = 0'}; {paid(spec)}"
         else:
             room = f"{up(100 * worst / bearable, 2)} % of what the tube has room for"
             message = f"the point is an equilibrium up to a rounding: {message}, {room}"
-            help = (
-                "nothing is wrong: the proof counts it in; more digits, or expressions (input: [m*g]), help"
-            )
+            digits = f" ({near_by})" if near_by else ""
+            help = f"nothing is wrong: the proof counts it in; more digits{digits}, or expressions (input: [m*g]), help"
         yield Finding(
             code=codes.NO_EQUILIBRIUM,
             severity=Severity.WARNING if notable else Severity.NOTE,
@@ -228,6 +229,34 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
             location=spec.location("trajectory.u"),
             help=f"correct x or u there; {paid(spec)}",
         )
+
+
+def _equilibrium(spec: Spec, curve: _Curve, model: ControlAffineModel) -> str:
+    """What to write for the equilibrium near a point, by Newton's method; empty if none is found in the safe set.
+
+    First the inputs alone move, then states as well, by equal shares of the safe set where there is a choice.
+    """
+    from tubecert.expression.matrix import jacobian
+
+    n, names = len(spec.states), (*model.states, *model.inputs)
+    drift = [row[0] for row in model.drift_on_plan()]
+    tape = Tape([*drift, *(slope for row in jacobian(drift, names) for slope in row)], (*names, TIME))
+    low, high = _sides(spec)
+    size = np.concatenate([(high - low) / 2, np.maximum(np.abs(curve.u[0]), 1.0)])
+    for first in (n, 0):
+        z = np.concatenate([curve.x[0], curve.u[0], curve.t])
+        for _ in range(_STEPS):
+            values = tape.run_floats(list(z[:, None]), (1,))[:, 0]
+            missed, slopes = values[:n], values[n:].reshape(n, -1) * size
+            if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(missed))):
+                break
+            if np.all(np.abs(missed) <= _LEFT * np.abs(slopes).max()):
+                found = [f"{value + 0.0:.12g}" for value in np.round(z[:-1] / size, 12) * size]
+                held = f"input: [{', '.join(found[n:])}]"
+                inside = np.all((low <= z[:n]) & (z[:n] <= high))
+                return (held if first else f"at: [{', '.join(found[:n])}], {held}") if inside else ""
+            z[first:-1] += np.linalg.lstsq(slopes[:, first:], -missed)[0] * size[first:]
+    return ""
 
 
 def _bearable(spec: Spec) -> float:
