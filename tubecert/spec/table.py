@@ -54,21 +54,11 @@ _ITSELF: Final = Column()
 def _read_columns(field: Field, names: Names) -> dict[str, Column] | None:
     """The columns that are not called as what they hold, or are in another unit."""
     fields = field.mapping(optional=_variables(names)) or {}
-    found = {name: _read_column(own, names) for name, own in fields.items()}
-    sound = {name: column for name, column in found.items() if column is not None}
-    called = [_called(name, sound) for name in _variables(names)]
-    twice = [name for name in sound if called.count(_called(name, sound)) > 1]
-    if twice:
-        message = f"the column {_called(twice[0], sound)[:60]} would be that of two"
-        fields[twice[0]].fail(codes.NAME, message, "every one has a column of its own")
-    return sound if len(sound) == len(found) and not twice else None
-
-
-def _read_column(field: Field, names: Names) -> Column | None:
-    if isinstance(field.node, Scalar):
-        return Column(name=field.node.text)
-    found: Column | None = _COLUMN.read(field, names)
-    return found
+    found = {
+        name: Column(name=own.node.text) if isinstance(own.node, Scalar) else _COLUMN.read(own, names)
+        for name, own in fields.items()
+    }
+    return None if None in found.values() else found
 
 
 def _called(name: str, columns: Columns) -> str:
@@ -196,17 +186,12 @@ def _placed(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, others
         elif cell.text in wanted:
             place[cell.text] = index
         elif not others:
-            said = (
-                f"{cell.text!r}" if _COLUMN_NAME.fullmatch(cell.text) else f"the name of column {index + 1}"
-            )
+            shown = _COLUMN_NAME.fullmatch(cell.text)
+            said = f"{cell.text!r}" if shown else f"the name of column {index + 1}"
             message = f"{said} is neither t nor a state nor an input"
             help = suggestion(cell.text, wanted, what="columns") if sheet.shown else _wanted(wanted)
-            sheet.fail(
-                cell,
-                codes.PLAN_COLUMNS,
-                message,
-                f"{help}; trajectory.columns names columns, and skips others",
-            )
+            help += "; trajectory.columns names columns, and skips others"
+            sheet.fail(cell, codes.PLAN_COLUMNS, message, help)
     return place
 
 
@@ -259,8 +244,5 @@ class _Rows:
             return value
         scaled = rounded(value * scale, DIGITS)
         if extreme := out_of_range(scaled):
-            self.sheet.fail(
-                cell, codes.LIMIT, f"{cell.text[:40]} times {float(scale):g} is {extreme}", MODERATE
-            )
-            return None
+            self.sheet.fail(cell, codes.LIMIT, f"{cell.text[:40]} in its scale is {extreme}", MODERATE)
         return scaled
