@@ -51,6 +51,9 @@ OF_A_MACHINE = ("hardware.", "trajectory.afterwards", "trajectory.input_rate")
 OF_FILES = {
     "system.definitions.*": "system.f",
     "system.tables.*.file": "system.tables.*.points",
+    "trajectory.columns.*": "trajectory.knots",
+    "trajectory.columns.*.name": "trajectory.knots",
+    "trajectory.columns.*.scale": "trajectory.knots",
     "initial_state.at.*": "initial_state.at",
     "uncertainty.bounds.*.h": "uncertainty.bounds.h",
     "uncertainty.bounds.*.h_x": "uncertainty.bounds.h_x",
