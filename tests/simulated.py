@@ -11,11 +11,11 @@ from shared import once
 
 from tubecert import pipeline
 from tubecert.certificate.result import Result
-from tubecert.simulate.engine import integrate
-from tubecert.simulate.problem import Batch, Disturbance, LoopProblem
-from tubecert.simulate.reading import adopted
-from tubecert.simulate.runs import Failure, Peak, Runs, Worst
-from tubecert.simulate.setting import Setting, setting_of
+from tubecert.simulation.adaptive.engine import integrate
+from tubecert.simulation.adaptive.problem import Batch, Disturbance, LoopProblem
+from tubecert.simulation.adaptive.reading import adopted
+from tubecert.simulation.adaptive.runs import Failure, Peak, Runs, Worst
+from tubecert.simulation.adaptive.setting import Setting, setting_of
 from tubecert.spec import Spec, load, load_text
 
 CONFIGS = Path(__file__).parent.parent / "configs"

@@ -91,6 +91,7 @@ _HOMES = {
     "SampledCertification": "library.sampled",
     "SampledSimulation": "library.sampled_simulation",
     "Simulation": "library.simulation",
+    "simulate": "library.simulating",
     "Specification": "library.specification",
     "load": "library.specification",
     "specification": "library.specification",
@@ -105,7 +106,6 @@ _HOMES = {
 _ROOMS = {
     "recheck": "library.rechecking",
     "report": "library.pages",
-    "simulate": "library.simulating",
     "sweep": "library.sweeping",
 }
 

@@ -28,8 +28,8 @@ from tubecert.recheck.run import recheck
 from tubecert.recheck.spelling import spelled
 from tubecert.sampled_loop.record import Claim, of_json
 from tubecert.sampled_loop.theorem import check
-from tubecert.simulation.campaign import simulate
-from tubecert.simulation.setting import setting_of
+from tubecert.simulation.sampled.campaign import simulate
+from tubecert.simulation.sampled.setting import setting_of
 from tubecert.spec import canonical
 from tubecert.verdict import Verdict
 

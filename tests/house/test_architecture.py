@@ -19,7 +19,7 @@ ROOMS = [
     "verdict", "letters", "progress", "expression", "records", "digits", "recheck", "spec", "enclosure",
     "claims", "model", "coordinates", "metric", "synthesis", "trajectory", "planner", "tube", "bounds",
     "conditions", "kernel", "search", "lint", "kinds", "certificate", "sampled_loop",
-    "loop_design", "controller", "stages", "words", "campaigns", "simulate", "simulation",
+    "loop_design", "controller", "stages", "words", "simulation",
     "pipeline", "checking", "sweep", "report", "library", "cli",
 ]  # fmt: skip
 MODULES = sorted(PACKAGE.rglob("*.py"))

@@ -44,7 +44,7 @@ NOT_RUN = {
     ".venv/bin/python -m pytest": "these tests",
     "tubecert sweep": "30 certificates, or a cluster; tests/sweep runs smaller ones",
     "dask": "a cluster; tests/executor starts one",
-    "tubecert simulate configs/three_state.yaml": "half a minute; tests/simulate",
+    "tubecert simulate configs/three_state.yaml": "half a minute; tests/simulation",
     "tubecert verify configs/published/": "minutes; tests/metric/test_published.py confirms what it found",
     "tubecert recheck plant.certificate.json --json": "the line above without it",
     "tubecert certify configs/pvtol.yaml": "half a minute; its README line is a test of tests/synthesis",

@@ -532,15 +532,15 @@ def test_a_single_state_is_drawn_over_time():
 @pytest.mark.slow
 def test_rooms_that_have_the_names_of_functions_are_both():
     code = """
-import tubecert.report.page, tubecert.recheck, tubecert.simulate.runs
+import tubecert.report.page, tubecert.recheck, tubecert.sweep.grid
 import tubecert as tc
-import tubecert.simulate as room
-assert room is tc.simulate and room.runs
+import tubecert.sweep as room
+assert room is tc.sweep and room.grid
 assert callable(tc.report) and tc.report.page and callable(tc.recheck)
 import inspect
-assert "progress" in inspect.signature(tc.simulate).parameters
+assert "progress" in inspect.signature(tc.sweep).parameters
 from tubecert import *
-assert callable(simulate) and callable(certify)
+assert callable(sweep) and callable(certify)
 """
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 

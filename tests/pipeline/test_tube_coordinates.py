@@ -11,11 +11,11 @@ from tubecert.certificate.result import Result
 from tubecert.claims.tube import TubeInSafeSet
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
-from tubecert.simulate.attack import cases
-from tubecert.simulate.engine import integrate
-from tubecert.simulate.flows import Fast
-from tubecert.simulate.judge import compare
-from tubecert.simulate.setting import Choice, loop_of, setting_of
+from tubecert.simulation.adaptive.attack import cases
+from tubecert.simulation.adaptive.engine import integrate
+from tubecert.simulation.adaptive.flows import Fast
+from tubecert.simulation.adaptive.judge import compare
+from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 

@@ -12,7 +12,7 @@ from tubecert.sampled_loop.record import Claim, HexMatrix, Nominal, Result
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.setting import Controller, Loop
 from tubecert.sampled_loop.theorem import check
-from tubecert.simulation.setting import Setting, setting_of
+from tubecert.simulation.sampled.setting import Setting, setting_of
 from tubecert.spec import canonical, load_text
 from tubecert.trajectory.make import plan_of
 from tubecert.verdict import Verdict

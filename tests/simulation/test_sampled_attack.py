@@ -8,10 +8,10 @@ import pytest
 from loops import proven, setting
 from scipy.optimize import linprog
 
-from tubecert.simulation import campaign
-from tubecert.simulation.attack import Attack, worst_of
-from tubecert.simulation.campaign import simulate
-from tubecert.simulation.kernels import goals
+from tubecert.simulation.sampled import campaign
+from tubecert.simulation.sampled.attack import Attack, worst_of
+from tubecert.simulation.sampled.campaign import simulate
+from tubecert.simulation.sampled.kernels import goals
 
 
 def followed(aims, size, rate):

@@ -9,10 +9,10 @@ from loops import proven, setting
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from tubecert.simulation import sampled
-from tubecert.simulation.attack import Attack
-from tubecert.simulation.families import course_of, courses
-from tubecert.simulation.sampled import linear
+from tubecert.simulation.sampled import loop as sampled
+from tubecert.simulation.sampled.attack import Attack
+from tubecert.simulation.sampled.families import course_of, courses
+from tubecert.simulation.sampled.loop import linear
 
 
 class Scripted(Attack):

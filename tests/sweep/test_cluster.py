@@ -22,9 +22,9 @@ from tubecert.enclosure.objective import SumOfNorms
 from tubecert.executor import Cluster, Serial, WorkerError
 from tubecert.expression import parse, symbol
 from tubecert.libraries import versions
-from tubecert.simulate import campaign
-from tubecert.simulate.attack import cases
-from tubecert.simulate.setting import Choice, loop_of
+from tubecert.simulation.adaptive import campaign
+from tubecert.simulation.adaptive.attack import cases
+from tubecert.simulation.adaptive.setting import Choice, loop_of
 from tubecert.trajectory import constant_plan
 from tubecert.tube import Tube
 

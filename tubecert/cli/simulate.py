@@ -82,11 +82,11 @@ def run(given: Given, output: Output) -> ExitCode:
     wishes = wishes_of(system, numbers, chosen, given.gains, given.plan)
     folder = _folder(given)
     executor = workers_of(jobs, given.scheduler, "--scheduler") or Serial()
-    from tubecert.campaigns.folder import prepared
     from tubecert.report.simulation import report as report_of
     from tubecert.report.simulation import verdict_line
-    from tubecert.simulate.files import write
-    from tubecert.simulate.record import summary
+    from tubecert.simulation.adaptive.files import write
+    from tubecert.simulation.adaptive.record import summary
+    from tubecert.simulation.folder import prepared
 
     require_members(system, wishes, flag)
     terminal = Terminal.stderr(color=output.color)
@@ -108,12 +108,12 @@ def run(given: Given, output: Output) -> ExitCode:
 
 def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Output) -> ExitCode:
     """The same of a sampled loop."""
-    from tubecert.campaigns.folder import prepared
     from tubecert.library.reading import read
     from tubecert.library.sampled import SampledCertification, certified
     from tubecert.library.simulating import sampled_of
     from tubecert.report.sampled_simulation import report as report_of
     from tubecert.report.sampled_simulation import verdict_line
+    from tubecert.simulation.folder import prepared
 
     words = {name: getattr(given, name) for name in ("metric", "scheduler", "controllers", "gains", "plan")}
     words["jobs"] = None if given.jobs == "1" else given.jobs
@@ -160,7 +160,7 @@ def _certificate(
 ) -> tuple[Spec, Certificate]:
     """The specification as it was certified, and its certificate: the one that is given, or a new one."""
     from tubecert.library.certification import certification_of, read
-    from tubecert.simulate.reading import adopted, require_tube
+    from tubecert.simulation.adaptive.reading import adopted, require_tube
 
     if given.certificate is not None:
         certified = read(str(given.certificate)).certificate

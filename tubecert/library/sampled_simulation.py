@@ -17,8 +17,8 @@ from tubecert.sampled_loop.record import Certificate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tubecert.simulation.campaign import Campaign
-    from tubecert.simulation.sampled import Controllers, Step
+    from tubecert.simulation.sampled.campaign import Campaign
+    from tubecert.simulation.sampled.loop import Controllers, Step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,8 +55,8 @@ class SampledSimulation:
 
         Raises `KeyError` for a name that is none, or of which there is nothing to draw.
         """
-        from tubecert.campaigns.figures import drawn
-        from tubecert.simulation.figures import DRAWERS
+        from tubecert.simulation.plots import drawn
+        from tubecert.simulation.sampled.figures import DRAWERS
 
         found = drawn(DRAWERS, name, self.campaign)
         if found is None:
@@ -65,8 +65,8 @@ class SampledSimulation:
 
     def save(self, folder: File) -> list[str]:
         """Write summary, runs and figures into a folder, as the command does; their names. Raises `TargetError`."""
-        from tubecert.campaigns.folder import prepared, written_to
-        from tubecert.simulation.figures import files
+        from tubecert.simulation.folder import prepared, written_to
+        from tubecert.simulation.sampled.figures import files
 
         with prepared(os.fspath(folder)):
             return written_to(os.fspath(folder), self.summary, files(self.campaign))

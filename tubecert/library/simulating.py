@@ -34,10 +34,10 @@ from tubecert.spec import Spec
 from tubecert.trajectory.make import plan_of
 
 if TYPE_CHECKING:
-    from tubecert.simulate.campaign import Campaign
-    from tubecert.simulate.families import Drawing
-    from tubecert.simulate.loops import Controller
-    from tubecert.simulate.setting import Setting
+    from tubecert.simulation.adaptive.campaign import Campaign
+    from tubecert.simulation.adaptive.families import Drawing
+    from tubecert.simulation.adaptive.loops import Controller
+    from tubecert.simulation.adaptive.setting import Setting
 
 _HERE: Final = Serial()
 EXTRA: Final = ("matplotlib",)
@@ -87,7 +87,7 @@ def simulate(
     require_extra()
     chosen = controllers_of(controllers, str)
     one_of("gains", gains, words_of(ADAPTIVE))
-    from tubecert.simulate.reading import adopted, require_tube
+    from tubecert.simulation.adaptive.reading import adopted, require_tube
 
     wishes = wishes_of(system, numbers, chosen, gains, plan)
     require_members(system, wishes, str)
@@ -102,8 +102,8 @@ def sampled_of(
 ) -> SampledSimulation:
     """The same of a sampled loop."""
     from tubecert.certificate.belonging import as_set
-    from tubecert.simulation.campaign import simulate as campaign
-    from tubecert.simulation.setting import setting_of
+    from tubecert.simulation.sampled.campaign import simulate as campaign
+    from tubecert.simulation.sampled.setting import setting_of
 
     require_extra(("matplotlib",))
     sampled_simulation.require_tube(found)
@@ -214,7 +214,7 @@ def controllers_of(given: str | Sequence[str] | None, named: Named) -> tuple[str
 
 def require_members(system: Spec, wishes: Wishes, named: Named) -> None:
     """Raises TC708 where a plan of a family is asked for, and there is no family."""
-    from tubecert.simulate.reading import require_family
+    from tubecert.simulation.adaptive.reading import require_family
 
     asked = ("members", wishes.members), ("plan", wishes.plan)
     require_family(system, [named(name) for name, value in asked if value is not None])
@@ -255,10 +255,10 @@ def campaign_of(
     executor: Executor = _HERE,
 ) -> Campaign:
     """Every loop that is wished for, integrated and attacked; random runs are those of the `executor`."""
-    from tubecert.simulate.campaign import follow
-    from tubecert.simulate.campaign import simulate as campaign
-    from tubecert.simulate.families import members_of
-    from tubecert.simulate.setting import Choice, loop_of
+    from tubecert.simulation.adaptive.campaign import follow
+    from tubecert.simulation.adaptive.campaign import simulate as campaign
+    from tubecert.simulation.adaptive.families import members_of
+    from tubecert.simulation.adaptive.setting import Choice, loop_of
 
     setting, drawing = _setting(system, result, wishes)
     choice = Choice(
@@ -290,8 +290,8 @@ def campaign_of(
 def _setting(system: Spec, result: Result, wishes: Wishes) -> tuple[Setting, Drawing | None]:
     """The setting; of a family that of the plan that is given, or of a random one, and what draws others."""
     from tubecert.model import build
-    from tubecert.simulate.families import drawing_of, members_of
-    from tubecert.simulate.setting import horizon_of, setting_of
+    from tubecert.simulation.adaptive.families import drawing_of, members_of
+    from tubecert.simulation.adaptive.setting import horizon_of, setting_of
 
     if system.trajectory.bundle is None:
         return setting_of(system, result, wishes.duration), None

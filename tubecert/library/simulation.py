@@ -16,9 +16,9 @@ from tubecert.records import Json
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tubecert.simulate.campaign import Campaign
-    from tubecert.simulate.record import Outcome, Summary
-    from tubecert.simulate.runs import Runs
+    from tubecert.simulation.adaptive.campaign import Campaign
+    from tubecert.simulation.adaptive.record import Outcome, Summary
+    from tubecert.simulation.adaptive.runs import Runs
 
 
 OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
@@ -50,7 +50,7 @@ class Simulation:
         return self._found().to_json()
 
     def _found(self) -> Summary:
-        from tubecert.simulate.record import summary
+        from tubecert.simulation.adaptive.record import summary
 
         return summary(self.campaign, self.compared_with)
 
@@ -78,8 +78,8 @@ class Simulation:
 
         Raises `KeyError` for a name that is none, or of which there is nothing to draw.
         """
-        from tubecert.campaigns.figures import drawn
-        from tubecert.simulate.figures import DRAWERS
+        from tubecert.simulation.adaptive.figures import DRAWERS
+        from tubecert.simulation.plots import drawn
 
         found = drawn(DRAWERS, name, self.campaign)
         if found is None:
@@ -91,8 +91,8 @@ class Simulation:
 
         Raises `TargetError`.
         """
-        from tubecert.campaigns.folder import prepared
-        from tubecert.simulate.files import write
+        from tubecert.simulation.adaptive.files import write
+        from tubecert.simulation.folder import prepared
 
         with prepared(os.fspath(folder)):
             return write(os.fspath(folder), self.campaign, certificate=self.compared_with)

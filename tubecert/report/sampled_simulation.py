@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-    from tubecert.simulation.campaign import Campaign, Violation
+    from tubecert.simulation.sampled.campaign import Campaign, Violation
 
 _CODES = {"c": "the controller is the exported C code", "floats": "the controller's tables in floats"}
 

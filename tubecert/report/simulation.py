@@ -15,8 +15,8 @@ from tubecert.report.layout import indented, kept_in, titled
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tubecert.simulate.judge import Clearance, Comparison, InputUse, RunAt, Stopped, Violation
-    from tubecert.simulate.record import GainsData, LoopData, MembersData, Summary
+    from tubecert.simulation.adaptive.judge import Clearance, Comparison, InputUse, RunAt, Stopped, Violation
+    from tubecert.simulation.adaptive.record import GainsData, LoopData, MembersData, Summary
 
 STYLES: Final = {
     "falsified": "bold red",

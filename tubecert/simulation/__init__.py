@@ -1,15 +1,14 @@
-"""Simulation of certificate D: the nonlinear plant with the certified controller in the loop, attacked.
+"""Simulation: closed loops, attacked. A run may falsify a certificate and never supports one.
 
-In: a specification and what was proven of its sampled loop. Out: runs, the share of the tube that they attained, and
-what they falsify. All runs are lanes of one numpy vector. Trusted: no.
+In: a specification and what was proven. Out: runs, what they falsify, summaries, figures. Trusted: no; no trusted room
+imports this one.
 
 | module | what it does |
 |---|---|
-| `setting` | specification and certificate -> plant, times, tube, plan, all in floats |
-| `kernels` | what each signal does to a state, lag by lag, in the loop without remainders |
-| `families` | what lanes follow: the plan, or random plans of a family |
-| `attack` | the lanes: adversaries, who know the kernels, and random signals |
-| `sampled` | samples, delay, held inputs; integrated twice, with what is seen of every lane |
-| `campaign` | lanes by chunks, what they come to, and its summary |
-| `figures` | the files of a campaign |
+| `adaptive`, `sampled` | the loops of the paper in continuous time; the loop that a computer closes |
+| `lanes` | runs as lanes of one vector: Runge-Kutta steps of any system, peaks, what is seen at output times |
+| `plans` | random plans of a family, as lanes |
+| `obstacles` | how near points come to an obstacle |
+| `plots` | colours, labels, legends, obstacles in a plane; a figure as files |
+| `folder` | a folder that is tried before any work is done, and to which the summary comes last |
 """

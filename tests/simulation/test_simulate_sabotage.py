@@ -1,0 +1,79 @@
+"""Certificates that lie are found by the default campaign, told with seed, run and time, and the run can be repeated.
+
+That of a sampled loop whose table has another sign is in tests/simulation/test_sampled_attack.py.
+"""
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+from io import StringIO
+
+import pytest
+from rich.console import Console
+from simulated import setting
+
+from tubecert.library.simulating import RUNS
+from tubecert.report.simulation import report
+from tubecert.simulation.adaptive.campaign import simulate
+from tubecert.simulation.adaptive.record import summary
+from tubecert.simulation.adaptive.setting import Choice, loop_of
+
+SEED = 0
+
+
+def gains(own):
+    """They are a tenth of those that are certified."""
+    loop = loop_of(own, "l1", Choice())
+    honest = loop.problem.gains
+    less = {name: getattr(honest, name) / 10 for name in ("bandwidth", "adaptation_rate")}
+    return own, replace(loop, problem=replace(loop.problem, gains=replace(honest, **less)))
+
+
+def uncertainty(own):
+    """h is outside of its class: twice as large, and as fast."""
+    names = ("h", "h_x", "h_t", "h_initial")
+    own = replace(
+        own,
+        uncertainty=replace(own.uncertainty, **{name: 2 * getattr(own.uncertainty, name) for name in names}),
+    )
+    return own, loop_of(own, "l1", Choice())
+
+
+def metric(own):
+    """W times .9: distances are 5 % longer than they were certified."""
+    W = tuple(tuple(Fraction(9, 10) * entry for entry in row) for row in own.model.W)
+    own = replace(own, model=replace(own.model, W=W))
+    return own, loop_of(own, "l1", Choice())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "lie", "bound"),
+    [("two_state", gains, "tube"), ("flat", uncertainty, "xtilde"), ("flat", metric, "D(t)")],
+)
+def test_a_lie_is_found_with_seed_run_and_time(name, lie, bound):
+    own, loop = lie(setting(name))
+    found = summary(simulate(own, [loop], count=RUNS, seed=SEED), "hash")
+    assert (found.outcome, found.seed) == ("falsified", SEED)
+    random, aimed = (
+        part.comparison.violations for part in (found.attacks[0].random, found.attacks[0].adversary)
+    )
+    assert bound in {item.bound_of for item in aimed}
+    broken = next(item for item in random if item.bound_of == bound)
+    assert broken.value > broken.bound
+    console = Console(file=StringIO(), width=200)
+    console.print(*report(found, folder="x", files=[], verbose=True))
+    told = console.file.getvalue()
+    assert re.search(rf"VIOLATION.* t = \S+ s, random run {broken.run}, seed {SEED}\n", told, re.DOTALL), told
+    again = simulate(own, [loop], count=0, seed=SEED, replay=broken.run).drawn[0].comparison
+    same = next(item for item in again.violations if item.bound_of == bound)
+    assert same.value == pytest.approx(broken.value, rel=1e-2)
+    assert same.t == pytest.approx(broken.t, abs=0.05 * own.horizon)
+
+
+@pytest.mark.slow
+def test_the_truth_is_not_falsified():
+    own = setting("flat")
+    found = simulate(own, [loop_of(own, "l1", Choice())], count=RUNS, seed=SEED)
+    assert not found.falsified
+    assert not found.unreliable

@@ -1,0 +1,21 @@
+"""Simulation of certificates with a metric: the closed loops of the paper, integrated fast, and attacked.
+
+In: a model, a plan, gains and a disturbance. Out: `Runs` with their own error estimate. Trusted: no.
+Implements: theory 2 to 4b, the loops.
+
+| module | what it does |
+|---|---|
+| `problem`, `loops`, `runs` | what is simulated, the terms of the loops, and what comes out |
+| `engine` | steps are halved until the error estimate of every lane is small enough |
+| `continuous` | the loops as a system of lanes: feedback, and the stages around the fast part |
+| `flows` | (xtilde, sigma_hat, u_a): exact where linear, and caught at the ball of the projection |
+| `acting` | the plant's terms, the disturbance, wind and parameters of every lane |
+| `geodesics`, `times` | Chebyshev geodesics; the times of the steps, and the plan at them |
+| `reading` | a certificate, read back; what it promises about a loop |
+| `setting` | plan, times, starts and loops with their gains, certified or chosen |
+| `families` | random plans of a family |
+| `uncertainty` | random members and adversaries of the certified class |
+| `attack`, `campaign` | random runs and the search for the worst; all that one command simulates |
+| `judge` | runs against promises; distances from obstacles |
+| `record`, `files`, `figures` | a campaign as the records of its summary, as files, as figures |
+"""

@@ -1,0 +1,114 @@
+"""What acts on a loop: random members of the class and random starts, and a search for the worst of them.
+
+Run i draws everything from its own generator, keyed by (seed, i): it can be repeated alone, and is the same run however
+many there are, however they are grouped, and whoever does them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.progress import Phase, Progress, Step
+from tubecert.simulation.adaptive.engine import integrate
+from tubecert.simulation.adaptive.problem import Batch, Disturbance, LoopProblem
+from tubecert.simulation.adaptive.runs import Runs
+from tubecert.simulation.adaptive.setting import Loop, Setting
+from tubecert.simulation.adaptive.uncertainty import Waves, acting, adversaries, random_members
+
+_POPULATION, _ELITE, _ROUNDS = 256, 12, 4
+_COARSER: Final = 4  # times: the steps of runs that are only compared
+_MOVED: Final = 0.3  # of the width of a gene, at first
+
+
+class Cases(NamedTuple):
+    """N runs: starts (N, n), and what acts on each of them."""
+
+    start: Array
+    h: Disturbance
+
+    def of(self, problem: LoopProblem) -> Batch:
+        """These runs of a loop."""
+        return Batch(problem=problem, x0=self.start, disturbance=self.h)
+
+
+def cases(setting: Setting, seed: int, numbers: Sequence[int]) -> Cases:
+    """What runs of a seed do, by their numbers: half are random members, half are random adversaries."""
+    kind, n = setting.uncertainty, len(setting.x0)
+    sizes = np.cumsum([1, kind.member, kind.adversary, kind.beside, n + 2])
+    seeds = [np.random.SeedSequence(entropy=seed, spawn_key=(number,)) for number in numbers]
+    genes = np.array([np.random.default_rng(each).random(sizes[-1]) for each in seeds])
+    coin, own, aimed, beside, begin = np.split(genes, sizes[:-1], axis=1)
+    start = _random_starts(setting, begin)
+    offset = (start - setting.centre) @ setting.S.T
+    both = random_members(kind, own, offset), adversaries(kind, aimed, offset, setting.layer)
+    chosen = (np.where(coin.reshape(-1, *[1] * (a.ndim - 1)) < 0.5, a, b) for a, b in zip(*both, strict=True))
+    return _cases(setting, start, Waves(*chosen), beside)
+
+
+def _cases(setting: Setting, start: Array, waves: Waves, beside: Array) -> Cases:
+    """The class is one of functions of z = S x."""
+    waves = waves._replace(wave=waves.wave @ setting.S)
+    return Cases(start, acting(setting.uncertainty, waves, beside, setting.centre, setting.layer))
+
+
+def _random_starts(setting: Setting, genes: Array) -> Array:
+    """The initial state, or points of the ball or the box that is allowed (its surface, half of the time), (N, n)."""
+    n = len(setting.x0)
+    direction, outside, radius = 2 * genes[:, :n] - 1, genes[:, n] < 0.5, genes[:, n + 1] ** (1 / n)
+    if not setting.within:
+        direction = np.where(outside[:, None], np.sign(direction), direction)
+    return _started(setting, direction, np.where(outside, 1.0, radius))
+
+
+def _started(setting: Setting, direction: Array, radius: Array) -> Array:
+    if not setting.varied:
+        return np.tile(setting.x0, (len(direction), 1))
+    return np.array([setting.started(*each) for each in zip(direction, radius, strict=True)])
+
+
+def bred(setting: Setting, genes: Array) -> Cases:
+    """The adversaries that genes (N, G) in [0, 1] describe, and where their runs start."""
+    kind = setting.uncertainty
+    aimed, beside, begin = np.split(genes, np.cumsum([kind.adversary, kind.beside]), axis=1)
+    start = _started(setting, 2 * begin - 1, np.ones(len(genes)))
+    offset = (start - setting.centre) @ setting.S.T
+    return _cases(setting, start, adversaries(kind, aimed, offset, setting.layer), beside)
+
+
+def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress | None = None) -> Cases:
+    """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed.
+
+    Its runs take a quarter of the steps of those that are `known`: what they find is a proposal.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
+    kind, count = setting.uncertainty, ceil(np.median(known.steps) / _COARSER)
+    problem = replace(loop.problem, times=np.linspace(0.0, setting.horizon, count + 1))
+    size = kind.adversary + kind.beside + (len(setting.x0) if setting.varied else 0)
+    genes = rng.random((_POPULATION, size))
+    kept, scores = np.zeros((0, size)), np.zeros(0)
+    for turn in range(_ROUNDS):
+        if report is not None:
+            done, of = turn * _POPULATION, _ROUNDS * _POPULATION
+            report(Step(phase=Phase.SIMULATION, name=f"{loop.controller}, adversary", done=done, of=of))
+        (runs,) = integrate([bred(setting, genes).of(problem)], tolerance=setting.tolerance, level=0)
+        found = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
+        pool, values = np.vstack([kept, genes]), np.concatenate([scores, found])
+        order = np.argsort(-values, kind="stable")[:_ELITE]
+        kept, scores = pool[order], values[order]
+        genes = children(kept, _POPULATION, 0.5 ** (turn + 1), rng)
+    return bred(setting, kept[:1])
+
+
+def children(parents: Array, count: int, spread: float, rng: np.random.Generator) -> Array:
+    """Mixtures of two parents each, moved a little; genes are mirrored at 0 and 1."""
+    chosen = rng.integers(len(parents), size=(2, count))
+    take = rng.random((count, parents.shape[1])) < 0.5
+    mixed = np.where(take, parents[chosen[0]], parents[chosen[1]])
+    moved = mixed + _MOVED * spread * rng.normal(size=mixed.shape)
+    return np.asarray(np.abs(np.remainder(moved + 1, 2) - 1))

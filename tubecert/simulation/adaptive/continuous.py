@@ -1,0 +1,252 @@
+"""The loops in continuous time as lanes of one vector: plant, feedback, and the fast part of every loop.
+
+x' = f + B(u* + k + u_a + h) + E w, (0.1) with (0.4). The stages are those of the exponential Runge-Kutta method of
+Krogstad: between them h is the polynomial of time through the stages so far, and the fast part flows under it. Without
+a fast part this is classical RK4. Of second order is what a moving B does to the fast part, and its projection, which
+the flow over the whole step has, and those up to the stages have not. The feedback (0.5) is the smallest k with
+phi_0 + phi_1'k <= 0: k = 0 if phi_0 <= 0, else -phi_0 phi_1/|phi_1|^2, where phi_0 = -2 gamma_s(0)'M(f(x*) + B(x*)u*)
++ 2 gamma_s(1)'M(f(x) + B(x)u*) + 2 rate E and phi_1 = 2 B'M gamma_s(1). Source: S. Krogstad, Generalized integrating
+factor methods for stiff PDEs, J. Comput. Phys. 203, 2005.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import log
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.digits import near
+from tubecert.enclosure.interval import Array
+from tubecert.simulation.adaptive.acting import Acting
+from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, times
+from tubecert.simulation.adaptive.geodesics import FOUND, REASONS, Geodesic, Geodesics
+from tubecert.simulation.adaptive.problem import Batch, LoopProblem
+from tubecert.simulation.adaptive.times import END, MIDDLE, START, Grid, Reference
+from tubecert.simulation.lanes import SHARES
+from tubecert.trajectory import Plan
+
+INFEASIBLE: Final = 10
+DIVERGED: Final = 20
+_FAR: Final = 1e6
+_ROUNDING: Final = 1e-12
+_SIDES: Final = (START, MIDDLE, MIDDLE, END)  # of a step, stage by stage
+
+
+class _Stage(NamedTuple):
+    """Of a stage: h, with E w after it where one blows, (F, N), and B (n, m, N) or (n, m)."""
+
+    forces: Array
+    B: Array
+
+
+class _Group(NamedTuple):
+    """Lanes whose fast part is the same, and its flows by the logarithm of the step's length, where B is constant."""
+
+    lanes: slice
+    fast: Fast
+    flows: dict[float, Flow]
+
+
+class Continuous:
+    """The lanes of some batches on a grid: a `lanes.System`.
+
+    `_y` (Y, N) is the fast part of every lane at the start of the step (`flows.blocks`).
+    """
+
+    def __init__(self, batches: Sequence[Batch], grid: Grid, plans: Sequence[Plan]) -> None:
+        first = batches[0].problem
+        n, m = len(first.model.states), len(first.model.inputs)
+        problems = [batch.problem for batch in batches]
+        sizes = [len(batch.x0) for batch in batches]
+        self._grid, self._N, self._decay = grid, sum(sizes), 2 * float(first.model.rate)
+        self._P = np.eye(n) if first.P is None else first.P
+        self._x0 = np.concatenate([batch.x0 for batch in batches]).T
+        self._acting = Acting([batch.acting for batch in batches], first.model, first.E, first.rest)
+        self._geodesics = Geodesics(first.model, first.degree, self._N)
+        self._at, self._blown = blocks(n, m), bool(first.E or first.rest)
+        places = [next(i for i, plan in enumerate(plans) if plan is problem.plan) for problem in problems]
+        self._plans = np.repeat(places, sizes) if len(plans) > 1 else None
+        self._limit = np.repeat([problem.limit for problem in problems], sizes)
+        self._predicts = np.repeat([problem.terms.predicts for problem in problems], sizes)
+        self._roots, self._groups = np.ones(self._N), list[_Group]()
+        for problem, size, end in zip(problems, sizes, np.cumsum(sizes).tolist(), strict=True):
+            if problem.adaptive and problem.gains is not None:
+                self._add(problem, slice(end - size, end))
+        self.stopped = np.zeros(self._N, dtype=np.int64)
+
+    def _add(self, problem: LoopProblem, lanes: slice) -> None:
+        """Lanes of a loop that adapts: to the group before, if that has the same terms and gains."""
+        assert problem.gains is not None
+        n, m = len(problem.model.states), len(problem.model.inputs)
+        if self._groups:
+            last = self._groups[-1]
+            if last.lanes.stop == lanes.start and (problem.terms, problem.gains) == (
+                last.fast.terms,
+                last.fast.gains,
+            ):
+                self._groups[-1] = last._replace(lanes=slice(last.lanes.start, lanes.stop))
+                self._roots[lanes] = last.fast.root
+                return
+        fast = Fast(problem.terms, problem.gains, self._P, m, m + n * self._blown)
+        self._groups.append(_Group(lanes, fast, {}))
+        self._roots[lanes] = fast.root
+
+    def start(self) -> Array:
+        """x (n, N) at the start."""
+        self.stopped[:] = FOUND
+        self._y = np.zeros((self._at.end, self._N))
+        self._stages = list[_Stage]()
+        self._own: list[Flow] = []
+        return self._x0.copy()
+
+    def reason(self, lane: int, stopped: int) -> str:
+        """Why a lane was stopped."""
+        limit = float(self._limit[lane])
+        beyond = "" if np.isinf(limit) else f": |x - x*| exceeds {near(limit, 4)}"
+        own = {
+            INFEASIBLE: "no input makes the metric contract here",
+            DIVERGED: f"the state diverges from the plan{beyond}",
+        }
+        return {**REASONS, **own}[stopped]
+
+    def at(self, step: int, stage: int, x: Array) -> Array:
+        """f + B(u* + k + h) + E w (n, N); what u_a has added to x meanwhile is added here."""
+        t = float(self._grid.start[step] + SHARES[stage] * self._grid.length[step])
+        plan = self._plan(step, _SIDES[stage])
+        if stage == 0:
+            self._stages.clear()
+        elif self._groups:
+            x = x + self._flown(step, stage, x)
+        x = self._near(x, plan.x)
+        terms = self._acting.terms(t, x)
+        geodesic = self._geodesics.connect(plan.x, x)
+        self._stop(geodesic.status != FOUND, geodesic.status)
+        ahead = terms.f + times(terms.B, plan.u)
+        push = _reached(terms.B, geodesic.end)
+        k = self._feedback(plan, ahead, push, geodesic)
+        h = self._acting.h(t, x, terms.base, push)
+        wind = self._acting.wind(t, terms, (geodesic.end, times(terms.B, push))) if self._blown else None
+        self._stages.append(_Stage(h if wind is None else np.concatenate([h, wind]), terms.B))
+        if stage == 0:
+            self._seen = {"x": x, "k": k, "h": h, "distance": np.sqrt(np.maximum(geodesic.energy, 0.0))}
+        slope = ahead + times(terms.B, k + h)
+        return slope if wind is None else slope + wind
+
+    def _plan(self, step: int, side: int) -> Reference:
+        """The plans of all lanes, (.., 1) if that is one."""
+        found = (part[step, side] for part in self._grid.plan)
+        return Reference(*(found if self._plans is None else (part[:, self._plans] for part in found)))
+
+    def _near(self, x: Array, plan: Array) -> Array:
+        """x, and the plan for lanes that are stopped because they are nowhere near it, or were before."""
+        off = x - plan
+        most = np.minimum(self._limit, _FAR * (1.0 + np.abs(plan).max(axis=0)))
+        self._stop(~(np.einsum("in,in->n", off, off) <= most * most), DIVERGED)  # not for nan
+        return np.where(self.stopped, plan, x) if self.stopped.any() else x
+
+    def _stop(self, lanes: NDArray[np.bool_], why: NDArray[np.int64] | int) -> None:
+        if lanes.any():
+            self.stopped[:] = np.where(lanes & (self.stopped == FOUND), why, self.stopped)
+
+    def _feedback(self, plan: Reference, ahead: Array, push: Array, geodesic: Geodesic) -> Array:
+        """k (m, N) of (0.5); `ahead` is f(x) + B(x)u*, `push` is phi_1/2."""
+        lost, gained = (plan.speed * geodesic.start).sum(axis=0), np.einsum("in,in->n", geodesic.end, ahead)
+        phi = self._decay * geodesic.energy - 2 * lost + 2 * gained
+        reach = np.einsum("jn,jn->n", push, push)
+        steep = (phi > 0) & (reach == 0)
+        self._stop(steep & (phi > _ROUNDING * (np.abs(lost) + np.abs(gained))), INFEASIBLE)
+        return np.where(reach > 0, np.minimum(-phi, 0.0) / (2 * reach), 0.0) * push
+
+    def _flown(self, step: int, stage: int, x: Array) -> Array:
+        """What u_a has added to the slow state until a stage (n, N); it is V times the mean of B so far."""
+        if stage == 1:
+            self._prepare(step, x)
+        V = np.zeros((self._at.V.stop - self._at.V.start, self._N))
+        for group, flow in zip(self._groups, self._own, strict=True):
+            V[:, group.lanes] = group.fast.idle(flow, self._begun(group, stage), whole=stage == 3)
+        return times(self._stages[stage - 1].B, V)
+
+    def _prepare(self, step: int, x: Array) -> None:
+        """The flows of a step: those of B at its middle, where x comes but for u_a."""
+        length, level = float(self._grid.length[step]), self._grid.level
+        t, B = float(self._grid.start[step]) + length / 2, self._stages[0].B
+        if B.ndim == 3:
+            B = self._acting.input(t, x + length / 2 * times(B, self._y[self._at.u_a]))
+            self._own = [group.fast.flow(B[..., group.lanes], length, level) for group in self._groups]
+            return
+        same = round(log(length), 10)  # lengths that differ by rounding are one
+        for group in self._groups:
+            if same not in group.flows:
+                group.flows[same] = group.fast.flow(B, length, level)
+        self._own = [group.flows[same] for group in self._groups]
+
+    def _begun(self, group: _Group, stage: int) -> Array:
+        """(y, p, p', p'') at the start of the step, where p is h as known before a stage, or after all four."""
+        a, *later = (own.forces[:, group.lanes] for own in self._stages)
+        slope, bend = np.zeros_like(a), np.zeros_like(a)
+        if stage == 2:
+            slope = 4 * (later[0] - a)  # a line whose mean over half of the step is the stage before
+        elif stage == 3:
+            slope = 2 * (later[1] - a)  # ... over the whole step
+        elif stage == 4:
+            middle, end = later[0] + later[1], later[2]
+            slope, bend = -3 * a + 2 * middle - end, 4 * (a - middle + end)
+        return np.concatenate([self._y[:, group.lanes], a, slope, bend])
+
+    def step(self, step: int) -> Array | float:
+        """Takes the fast part to the end of a step; what u_a has added to x."""
+        if not self._groups:
+            return 0.0
+        for group, flow in zip(self._groups, self._own, strict=True):
+            self._y[:, group.lanes] = group.fast.advance(flow, self._begun(group, 4))
+        a, b, c, d = (own.B for own in self._stages)
+        moved = times(a if a.ndim == 2 else (a + 2 * (b + c) + d) / 6, self._y[self._at.V])
+        self._y[self._at.V] = 0.0
+        if self.stopped.any():
+            self._y[:, self.stopped != FOUND] = 0.0
+        return moved
+
+    def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
+        """What is seen of the lanes at the start of a step; `off` is x - x*."""
+        at, y = self._at, self._y
+        plan = self._plan(step, START)
+        u_a = y[at.u_a].copy()
+        return {
+            **self._seen,
+            "u_a": u_a,
+            "sigma_hat": y[at.sigma_hat].copy(),
+            "xtilde": y[at.xi] / self._roots,
+            "u": plan.u + self._seen["k"] + u_a,
+            "off": self._seen["x"] - plan.x,
+            "slope": slope + times(self._stages[0].B, u_a),
+        }
+
+    def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
+        """What peaks are taken of (`runs.Worst`)."""
+        length, error = self._length, rows["sigma_hat"] - rows["h"]
+        return {
+            "distance": rows["distance"],
+            "deviation": length(rows["off"]),
+            "u": _norm(rows["u"]),
+            "k": _norm(rows["k"]),
+            "xtilde": length(rows["xtilde"]),
+            "sigma_error": np.where(self._predicts, _norm(error), 0.0),
+            "h": _norm(rows["h"]),
+            "speed": length(rows["slope"]),
+        }
+
+    def _length(self, z: Array) -> Array:
+        """|S z| of (S, n, N), in the coordinates of the tube."""
+        return np.asarray(np.sqrt(np.maximum((z * (self._P @ z)).sum(axis=1), 0.0)))
+
+
+def _norm(z: Array) -> Array:
+    return np.asarray(np.sqrt((z**2).sum(axis=1)))
+
+
+def _reached(B: Array, m: Array) -> Array:
+    """B'm (m, N)."""
+    return np.asarray(B.T @ m if B.ndim == 2 else np.einsum("ijn,in->jn", B, m))

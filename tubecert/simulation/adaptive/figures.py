@@ -1,0 +1,225 @@
+"""Figures of a campaign: the same bytes for the same data. They show; they prove nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tubecert.digits import near
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.simulation.adaptive.campaign import Campaign
+from tubecert.simulation.adaptive.setting import Loop, Setting
+from tubecert.simulation.plots import COLORS, TUBE, blank, images, labelled, names_of, titled
+from tubecert.simulation.plots import plane as plane_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_NAMES: Final = {
+    "l1": "L1 adaptive",
+    "ccm": "CCM alone",
+    "reference": "reference system",
+    "nominal": "CCM, no uncertainty",
+}
+_SHAPES: Final = 400  # cross-sections of the tube that are drawn
+_FARTHEST: Final = 5.0  # shares of the tube that are drawn
+
+
+def figures(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
+    """File names and contents, one figure after the other."""
+    return images(DRAWERS, campaign)
+
+
+def _states(campaign: Campaign) -> Figure:
+    """Every state over time, in the tube's half-widths, with the radius that is certified in the long run."""
+    setting, first = campaign.setting, campaign.drawn[0].runs
+    names = setting.spec.states
+    figure = blank(7.0, 0.9 + 1.7 * len(names))
+    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    promises = [item.loop.promise for item in campaign.drawn if item.loop.promise is not None]
+    ultimate = min((own.ultimate for own in promises if own.ultimate is not None), default=None)
+    plain = np.array_equal(setting.S, np.eye(len(names)))
+    for i, (axis, name, width) in enumerate(zip(axes, names, setting.half_widths, strict=True)):
+        plan, curves = first.x_plan[:, i], [item.runs.x[0, :, i] for item in campaign.drawn]
+        axis.fill_between(first.t, plan - width, plan + width, color=TUBE, alpha=0.25, lw=0, label="tube")
+        # |x_i - x_i*| <= sup sqrt(W_ii) d, as the half-widths, where they are what bounds the tube
+        rest = None if ultimate is None else ultimate if plain else ultimate / setting.rho * width
+        if rest is not None and rest < width:
+            for sign, label in ((-1, None), (1, "in the long run")):
+                axis.plot(first.t, plan + sign * rest, color=TUBE, lw=1.0, ls=(0, (5, 2)), label=label)
+        for item, curve in zip(campaign.drawn, curves, strict=True):
+            axis.plot(item.runs.t, curve, **_line(item.loop))
+        axis.plot(first.t, plan, color="black", lw=1.0, ls="--", label="plan")
+        axis.set_ylim(*_window(np.array([plan.min() - width, plan.max() + width]), curves, 1.5))
+        axis.set_ylabel(labelled(setting.spec, name))
+    return _over_time(figure, axes[-1], axes[0], campaign)
+
+
+def _plane(campaign: Campaign) -> Figure | None:
+    """The plane of two states with plan, tube, obstacles and loops."""
+    setting = campaign.setting
+    names = names_of(setting.spec)
+    if names is None:
+        return None
+    i, j = (setting.spec.states.index(name) for name in names)
+    t = np.linspace(0.0, setting.horizon, 2001)
+    plan = setting.plan.enclose(t, t)[0].mid[:, [i, j]]
+    section = _section(setting, i, j)
+    shapes = [section + point for point in _spread(plan)]
+    figure, axis = plane_of(setting.spec, names, shapes, plan)
+    for item in campaign.drawn:
+        axis.plot(item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4, **_line(item.loop))
+    for end, marker in ((0, "o"), (-1, "s")):
+        axis.plot(*plan[end], marker=marker, ms=4, color="black", ls="none", zorder=6)
+    tube = np.vstack(shapes)
+    axis.set_xlim(*_window(tube[:, 0], [item.runs.x[0, :, i] for item in campaign.drawn], 0.5))
+    axis.set_ylim(*_window(tube[:, 1], [item.runs.x[0, :, j] for item in campaign.drawn], 0.5))
+    axis.set_aspect("equal")
+    titled(figure, axis, _title(campaign), 5)
+    return figure
+
+
+def _inputs(campaign: Campaign) -> Figure:
+    """What acts, u = u* + k + u_a, for every input and loop, with limits and proven ranges."""
+    setting, first = campaign.setting, campaign.drawn[0].runs
+    limits = dict(setting.spec.limits)
+    figure = blank(7.0, 0.9 + 2.0 * len(setting.spec.inputs))
+    axes = figure.subplots(len(setting.spec.inputs), 1, sharex=True, squeeze=False)[:, 0]
+    for i, (axis, name) in enumerate(zip(axes, setting.spec.inputs, strict=True)):
+        for item in campaign.drawn:
+            axis.plot(item.runs.t, item.runs.u[0, :, i], **_line(item.loop))
+            stays = item.loop.promise.ranges.get(name) if item.loop.promise else None
+            for end, label in ((stays.least, "certified range"), (stays.greatest, None)) if stays else ():
+                axis.axhline(end, color=TUBE, lw=1.2, ls=":", label=label)
+        for limit, label in zip(limits.get(name, ()), ("limits", None), strict=False):
+            axis.axhline(float(limit), color="#7F7F7F", lw=1.0, label=label)
+        axis.plot(first.t, first.u_plan[:, i], color="black", lw=1.0, ls="--", label="plan")
+        axis.set_ylabel(labelled(setting.spec, name))
+    return _over_time(figure, axes[-1], axes[0], campaign)
+
+
+def _tube_use(campaign: Campaign) -> Figure:
+    """The distance over time, as a share of the tube; above 1 the tube is left."""
+    reach = campaign.setting.reach
+    figure = blank(7.0, 3.4)
+    axis = figure.subplots()
+    most = 1.0
+    for item in campaign.drawn:
+        share = item.runs.distance[0] / reach
+        most = max(most, float(np.nanmax(share)))
+        axis.plot(item.runs.t, share, **_line(item.loop))
+        if item.loop.promise is not None and item.loop.promise.decay is not None:
+            style = _line(item.loop, "certified D(t), ") | {"lw": 1.0, "ls": ":"}
+            axis.plot(item.runs.t, item.loop.promise.decay(item.runs.t) / reach, **style)
+    for attack in campaign.attacks:
+        if attack.worst is not None:
+            style = _line(attack.loop, "worst adversary, ") | {"lw": 1.0, "alpha": 0.5}
+            axis.plot(attack.worst.t, attack.worst.distance[0] / reach, **style)
+    axis.axhspan(0, 1, color=TUBE, alpha=0.18, lw=0)
+    axis.axhline(1, color=TUBE, lw=1.0)
+    axis.set_ylim(0, min(1.06 * most, _FARTHEST))
+    axis.set_ylabel("d(x*, x) / dbar")
+    return _over_time(figure, axis, axis, campaign)
+
+
+def _monte_carlo(campaign: Campaign) -> Figure | None:
+    """How the runs of a sample are spread over the tube, over time."""
+    attacks = campaign.attacks
+    if not attacks:
+        return None
+    reach = campaign.setting.reach
+    figure = blank(7.0, 0.8 + 2.8 * len(attacks))
+    axes = figure.subplots(len(attacks), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, attack in zip(axes, attacks, strict=True):
+        color, runs = COLORS[attack.loop.controller], attack.runs
+        share = runs.distance / reach
+        alive = ~np.isnan(share).all(axis=0)
+        t, share = runs.t[alive], share[:, alive]
+        low, q25, median, q75, high = np.nanquantile(share, [0, 0.25, 0.5, 0.75, 1], axis=0)
+        axis.fill_between(t, low, high, color=color, alpha=0.18, lw=0, label="all runs")
+        axis.fill_between(t, q25, q75, color=color, alpha=0.35, lw=0, label="middle half")
+        axis.plot(t, median, color=color, label="median")
+        if attack.worst is not None:
+            worst = attack.worst.distance[0] / reach
+            axis.plot(attack.worst.t, worst, color="black", lw=1.0, label="worst adversary")
+        if attack.loop.promise is not None and attack.loop.promise.decay is not None:
+            bound = attack.loop.promise.decay(t) / reach
+            axis.plot(t, bound, color=TUBE, lw=1.4, ls="--", label="certified D(t)")
+        axis.axhline(1, color=TUBE, lw=1.2, label="tube")
+        axis.set_ylim(0, min(max(1.08, 1.05 * float(np.nanmax(share))), _FARTHEST))
+        axis.set_ylabel("d(x*, x) / dbar")
+        title = f"{_NAMES[attack.loop.controller]}: {len(share)} random runs, seed {campaign.seed}"
+        axis.set_title(title, fontsize=9, loc="left")
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes[-1].set_xlabel("t [s]")
+    axes[-1].set_xlim(0, campaign.setting.horizon)
+    return figure
+
+
+DRAWERS: Final[Mapping[str, Callable[[Campaign], Figure | None]]] = {
+    "states": _states,
+    "plane": _plane,
+    "inputs": _inputs,
+    "tube_use": _tube_use,
+    "monte_carlo": _monte_carlo,
+}
+
+
+def _line(loop: Loop, about: str = "") -> dict[str, Any]:
+    """How the curves of a loop are drawn: dashed for the one that nothing adapts and h acts on."""
+    style = (0, (6, 1.5)) if loop.controller == "ccm" else "-"
+    return {"color": COLORS[loop.controller], "ls": style, "label": about + _NAMES[loop.controller]}
+
+
+def _title(campaign: Campaign) -> str:
+    setting = campaign.setting
+    return f"{setting.spec.name}: rho = {near(setting.rho, 4)}, uncertainty {campaign.uncertainty}"
+
+
+def _over_time(figure: Figure, bottom: Axes, top: Axes, campaign: Campaign) -> Figure:
+    """Time on the axes at the bottom; the title over those whose labels become the legend."""
+    bottom.set_xlabel("t [s]")
+    bottom.set_xlim(0, campaign.setting.horizon)
+    titled(figure, top, _title(campaign), 3)
+    return figure
+
+
+def _window(tube: Array, curves: list[Array], room: float) -> tuple[float, float]:
+    """Limits that show the tube (K,) and what stays within some tubes of it; what diverges leaves the picture."""
+    low, high = tube.min(), tube.max()
+    away = room * (high - low)
+    shown = np.concatenate(
+        [tube, *(np.clip(own[np.isfinite(own)], low - away, high + away) for own in curves)]
+    )
+    margin = 0.05 * np.ptp(shown)
+    return float(shown.min() - margin), float(shown.max() + margin)
+
+
+def _spread(curve: Array) -> Array:
+    """Points (K, 2) of a curve at equal distances along it."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    if length[-1] == 0:
+        return curve[:1]
+    wanted = np.linspace(0.0, length[-1], _SHAPES)
+    return np.stack([np.interp(wanted, length, curve[:, i]) for i in range(2)], axis=1)
+
+
+def _section(setting: Setting, i: int, j: int) -> Array:
+    """The outline (K, 2) of the tube around a point of the plan, projected to the plane of two states.
+
+    For a constant metric that is the projection of the ellipsoid d < dbar; else that of |S (x - x*)| < rho, a disc
+    where z is x, cut to the half-widths.
+    """
+    angle = np.linspace(0.0, 2 * np.pi, 73)[:-1]
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    W = setting.model.W
+    if all(e.is_constant for row in W for e in row):
+        values = Tape([W[a][b] for a in (i, j) for b in (i, j)], ()).run_floats([], ()).reshape(2, 2)
+        return np.asarray(setting.reach * circle @ np.linalg.cholesky(values).T)
+    widths = setting.half_widths[[i, j]]
+    spread = np.linalg.inv(setting.S.T @ setting.S)[np.ix_([i, j], [i, j])]
+    return np.clip(setting.rho * circle @ np.linalg.cholesky(spread).T, -widths, widths)

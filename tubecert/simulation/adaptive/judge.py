@@ -1,0 +1,384 @@
+"""Runs against a promise: the largest share of every bound that was used, violations, what is no result, clearances.
+
+All numbers of a run are known up to its own error estimate, relative to rho: a bound is broken only beyond that.
+A comparison is a record of the summary as it is: runs are told by their numbers, None stands for what is no number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.digits import near
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.errors import TubecertError
+from tubecert.expression import Expression, derivatives
+from tubecert.findings import Finding
+from tubecert.model import TIME
+from tubecert.simulation.adaptive.reading import Promise
+from tubecert.simulation.adaptive.runs import Runs
+from tubecert.simulation.adaptive.setting import Setting
+from tubecert.simulation.obstacles import in_plane, signed_distance
+from tubecert.spec import Spec
+from tubecert.verdict import Verdict
+
+_USABLE: Final = 1e-2  # of rho: a run with a larger error estimate is no result
+_EXACT: Final = 1e-6  # what rounding may add to a bound that is met with equality
+_SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "speed")
+_LISTED: Final = 20  # of the runs that left, stopped or came to nothing
+_POINTS: Final = 2001  # of a curve, whose distances from obstacles are taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunAt:
+    """A run, by its number, and a time in s."""
+
+    run: int
+    t: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stopped(RunAt):
+    """A run that ended early, and why."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Use:
+    """The largest value of a quantity over some runs, its bound and share if it has one, and where it was met."""
+
+    value: float
+    bound: float | None
+    share: float | None
+    run: int
+    t: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violation:
+    """A bound that a run broke: of what (`tube` is d(x*, x) < dbar itself), and where."""
+
+    bound_of: str
+    run: int
+    t: float | None
+    value: float | None
+    bound: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputUse:
+    """How far an input went in some runs, and the range that is proven, if one is."""
+
+    input: str
+    least: float
+    greatest: float
+    proven: tuple[float, float] | None
+
+    def joined(self, other: InputUse) -> InputUse:
+        """Over the runs of both."""
+        least, greatest = min(self.least, other.least), max(self.greatest, other.greatest)
+        return InputUse(input=self.input, least=least, greatest=greatest, proven=self.proven or other.proven)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """What runs used of the tube and of every bound; from `settled` on all of them stay in the ultimate radius.
+
+    `first_exit` is the run that leaves the tube first, and when. `no_result` counts runs that tell nothing: those of
+    them that are not `stopped` depend on the steps of the integration from the time in `unresolved` on.
+    """
+
+    runs: int
+    left_the_tube: int
+    first_outside: tuple[int, ...]
+    first_exit: RunAt | None
+    no_result: int
+    unresolved: tuple[RunAt, ...]
+    stopped: tuple[Stopped, ...]
+    worst: Mapping[str, Use]
+    violations: tuple[Violation, ...]
+    settled: float | None
+    final_deviation: float | None
+    error_estimate: float
+    inputs: tuple[InputUse, ...] = ()
+
+
+class _Judged(NamedTuple):
+    """Runs with what is known of each, (N,): whether it is a result, whether it left the tube, room for its error.
+
+    `deviation` (N, K) is |S (x - x*)|; `first` the number of the first run.
+    """
+
+    setting: Setting
+    runs: Runs
+    usable: NDArray[np.bool_]
+    left: NDArray[np.bool_]
+    room: Array
+    deviation: Array
+    first: int
+
+
+def compare(setting: Setting, runs: Runs, promise: Promise | None, first: int = 0) -> Comparison:
+    """The comparison of runs, numbered from `first` on, with the tube, and with a promise if there is one."""
+    own = _judged(setting, runs, first)
+    bounds = promise.bounds if promise else {"distance": setting.reach, "deviation": setting.rho}
+    outside, void = np.flatnonzero(own.left), ~own.usable & ~own.left
+    stopped = {item.lane for item in runs.failures}
+    return Comparison(
+        runs=runs.lanes,
+        left_the_tube=len(outside),
+        first_outside=tuple((first + outside[:_LISTED]).tolist()),
+        first_exit=_first_exit(own),
+        no_result=int(void.sum()),
+        unresolved=tuple(
+            RunAt(run=first + int(lane), t=_finite(runs.unresolved[lane]))
+            for lane in np.flatnonzero(void)
+            if lane not in stopped
+        )[:_LISTED],
+        stopped=tuple(
+            Stopped(run=first + item.lane, t=_finite(item.t), reason=item.reason)
+            for item in runs.failures[:_LISTED]
+        ),
+        worst={name: _use(own, name, bounds.get(name)) for name in _SHOWN} if own.usable.any() else {},
+        violations=tuple(_violations(own, promise)) if promise else (),
+        settled=_settled(own, promise.ultimate if promise else None),
+        final_deviation=float(np.max(own.deviation[own.usable, -1])) if own.usable.any() else None,
+        error_estimate=float(np.max(runs.error[own.usable], initial=0.0)),
+        inputs=tuple(_inputs(own, promise)) if own.usable.any() else (),
+    )
+
+
+def merged(parts: Sequence[Comparison]) -> Comparison:
+    """One comparison of runs along several plans, which are numbered through."""
+    settled = [part.settled for part in parts]
+    exits = [part.first_exit for part in parts if part.first_exit is not None]
+    used = [part for part in parts if part.worst]
+    inputs: dict[str, InputUse] = {}
+    for own in (own for part in parts for own in part.inputs):
+        inputs[own.input] = own.joined(inputs.get(own.input, own))
+    return Comparison(
+        runs=sum(part.runs for part in parts),
+        left_the_tube=sum(part.left_the_tube for part in parts),
+        first_outside=tuple(run for part in parts for run in part.first_outside)[:_LISTED],
+        first_exit=min(exits, key=lambda exit: math.inf if exit.t is None else exit.t, default=None),
+        no_result=sum(part.no_result for part in parts),
+        unresolved=tuple(item for part in parts for item in part.unresolved)[:_LISTED],
+        stopped=tuple(item for part in parts for item in part.stopped)[:_LISTED],
+        worst={
+            name: max((part.worst[name] for part in used), key=lambda use: use.value)
+            for name in _SHOWN
+            if used
+        },
+        violations=tuple(item for part in parts for item in part.violations),
+        settled=None if None in settled else max(t for t in settled if t is not None),
+        final_deviation=max(
+            (p.final_deviation for p in parts if p.final_deviation is not None), default=None
+        ),
+        error_estimate=max(part.error_estimate for part in parts),
+        inputs=tuple(inputs.values()),
+    )
+
+
+def _judged(setting: Setting, runs: Runs, first: int) -> _Judged:
+    """A run that was stopped has left the tube if it was far outside: its error estimate is void, its exit is not."""
+    usable = runs.error <= _USABLE * setting.rho
+    room = _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
+    peaks = runs.worst
+    left = usable & (peaks.deviation.value > setting.rho * (1 + room))
+    left |= usable & (peaks.distance.value > setting.reach * (1 + room))
+    for item in runs.failures:
+        left[item.lane] |= peaks.deviation.value[item.lane] > 2 * setting.rho
+    deviation = np.linalg.norm((runs.x - runs.x_plan) @ setting.S.T, axis=2)
+    return _Judged(setting, runs, usable, left, room, deviation, first)
+
+
+def _use(own: _Judged, name: str, bound: float | None) -> Use:
+    peak = getattr(own.runs.worst, name)
+    lane = int(np.argmax(np.where(own.usable, peak.value, -np.inf)))
+    value, share = float(peak.value[lane]), None if not bound else float(peak.value[lane]) / bound
+    return Use(value=value, bound=bound, share=share, run=own.first + lane, t=float(peak.time[lane]))
+
+
+def _first_exit(own: _Judged) -> RunAt | None:
+    """The first run that is outside of the tube at an output time (else when its distance peaks)."""
+    lanes = np.flatnonzero(own.left)
+    if not len(lanes):
+        return None
+    beyond = (own.deviation > own.setting.rho) | (own.runs.distance > own.setting.reach)
+    at = np.where(beyond.any(axis=1), own.runs.t[np.argmax(beyond, axis=1)], own.runs.worst.deviation.time)
+    lane = int(lanes[np.argmin(at[lanes])])
+    return RunAt(run=own.first + lane, t=float(at[lane]))
+
+
+def _settled(own: _Judged, ultimate: float | None) -> float | None:
+    """From when on every run stays within the ultimate radius; None if one does not, or if there is none."""
+    if ultimate is None or not own.usable.any():
+        return None
+    beyond = np.flatnonzero((own.deviation[own.usable] > ultimate).any(axis=0))
+    after = beyond[-1] + 1 if len(beyond) else 0
+    return float(own.runs.t[after]) if after < len(own.runs.t) else None
+
+
+def _inputs(own: _Judged, promise: Promise | None) -> Iterator[InputUse]:
+    """The range of every input that has limits or a proven range, over all steps of the runs that are results."""
+    ranges, spec = promise.ranges if promise else {}, own.setting.spec
+    for name in dict.fromkeys((*(name for name, _ in spec.limits or ()), *ranges)):
+        column, stays = spec.inputs.index(name), ranges.get(name)
+        yield InputUse(
+            input=name,
+            least=float(own.runs.least[own.usable, column].min()),
+            greatest=float(own.runs.greatest[own.usable, column].max()),
+            proven=(stays.least, stays.greatest) if stays else None,
+        )
+
+
+def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
+    """Every bound that is broken, by the run that breaks it most."""
+    runs, spec = own.runs, own.setting.spec
+    never = np.full(runs.lanes, np.nan)  # when an input was at its end is not known
+    for name, bound in promise.bounds.items():
+        peak = getattr(runs.worst, name)
+        yield from _broken(own, "tube" if name == "distance" else name, peak.value, bound, bound, peak.time)
+    rows = [*np.eye(len(spec.states)), *(np.array([*map(float, output.row)]) for output in spec.outputs)]
+    for name, row in zip((*spec.states, *(output.name for output in spec.outputs)), rows, strict=True):
+        width, away = promise.half_widths[name], np.abs((runs.x - runs.x_plan) @ row)
+        yield from _over_time(own, f"half-width of {name}", away, np.full(len(runs.t), width), width)
+    for name, stays in promise.ranges.items():
+        column, size = spec.inputs.index(name), stays.greatest - stays.least
+        ends = (("", runs.greatest, stays.greatest), ("-", -runs.least, -stays.least))
+        for sign, values, bound in ends:
+            yield from _broken(own, f"input {sign}{name}", values[:, column], bound, size, never)
+    if promise.decay is not None:
+        yield from _over_time(own, "D(t)", runs.distance, promise.decay(runs.t), own.setting.reach)
+    for item in runs.failures:
+        if own.left[item.lane]:
+            peak = _finite(runs.worst.deviation.value[item.lane])
+            yield Violation(
+                bound_of="tube",
+                run=own.first + item.lane,
+                t=_finite(item.t),
+                value=peak,
+                bound=own.setting.rho,
+            )
+
+
+def _over_time(own: _Judged, name: str, values: Array, allowed: Array, scale: float) -> Iterator[Violation]:
+    """Values (N, K) against a bound (K,) at the output times: each run where it is furthest beyond."""
+    worst = np.argmax(np.nan_to_num(values - allowed, nan=-np.inf), axis=1)
+    lanes = np.arange(len(values))
+    return _broken(own, name, values[lanes, worst], allowed[worst], scale, own.runs.t[worst])
+
+
+def _broken(
+    own: _Judged, name: str, values: Array, bounds: Array | float, scale: float, times: Array
+) -> Iterator[Violation]:
+    """The run whose value (N,) is furthest beyond its bound and what its error may add, a part of `scale`."""
+    bounds = np.broadcast_to(bounds, values.shape)
+    excess = np.where(own.usable, values - bounds - own.room * scale, -np.inf)
+    lane = int(np.argmax(excess))
+    if excess[lane] > 0:
+        yield Violation(
+            bound_of=name,
+            run=own.first + lane,
+            t=_finite(times[lane]),
+            value=float(values[lane]),
+            bound=float(bounds[lane]),
+        )
+
+
+def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: str) -> None:
+    """Raises if h leaves the class that was certified while the state is in the tube: such a run tests nothing.
+
+    |h|, |h_x| and |h_t| are looked at along the runs, and |h| at the start.
+    """
+    kind, states = setting.uncertainty, setting.model.states
+    tape = Tape([*h, *(e for name in (TIME, *states) for e in derivatives(h, name))], (TIME, *states))
+    t, x = np.broadcast_to(runs.t, runs.distance.shape), np.moveaxis(runs.x, 2, 0)
+    values = tape.run_floats([t, *x], t.shape).reshape(2 + len(states), kind.m, *t.shape)
+    inside = np.cumsum(~(runs.distance < setting.reach), axis=1) == 0
+    slopes = np.moveaxis(values[2:], (0, 1), (3, 2))
+    with np.errstate(invalid="ignore"):
+        h_x = np.linalg.norm(np.nan_to_num(slopes @ np.linalg.inv(setting.S)), ord=2, axis=(2, 3))
+        size, h_t = np.linalg.norm(values[:2], axis=1)
+    sizes = (
+        ("|h|", size, kind.h, "h"),
+        ("|dh/dt|", h_t, kind.h_t, "h_t"),
+        ("|dh/dx|", h_x, kind.h_x, "h_x"),
+        ("|h| at the start", np.where(runs.t == 0, size, 0.0), kind.h_initial, "h"),
+    )
+    for words, found, bound, declared in sizes:
+        excess = np.where(inside, np.nan_to_num(found), 0.0)
+        lane, step = np.unravel_index(int(np.argmax(excess)), excess.shape)
+        if excess[lane, step] > bound * (1 + _EXACT):
+            message = (
+                f"the uncertainty leaves the class that was certified: {words} is "
+                f"{near(excess[lane, step])} > {near(bound)} at t = {near(runs.t[step], 4)}"
+            )
+            help, place = (
+                f"certify with {declared} declared in uncertainty.bounds",
+                setting.spec.location(where),
+            )
+            raise TubecertError([Finding(code="TC706", message=message, location=place, help=help)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clearance:
+    """The least distance to an obstacle, by its number (negative: by how much it is entered), and when in s."""
+
+    obstacle: int
+    clearance: float | None
+    t: float | None
+    collides: bool
+
+
+def of_tube(setting: Setting) -> tuple[Clearance, ...]:
+    """That of the tube over the whole plan: what is proven, in the certificate."""
+    return tuple(
+        Clearance(
+            obstacle=number,
+            clearance=_finite(own.clearance.below),
+            t=own.t,
+            collides=own.verdict is Verdict.REFUTED,
+        )
+        for number, own in enumerate(setting.certified.result.clearance)
+    )
+
+
+def of_plan(setting: Setting) -> tuple[Clearance, ...]:
+    """That of the plan, in many points: no proof."""
+    t = np.linspace(0.0, setting.horizon, _POINTS)
+    return _of_curve(setting.spec, t, setting.plan.enclose(t, t)[0].mid)
+
+
+def of_run(setting: Setting, runs: Runs) -> tuple[Clearance, ...]:
+    """That of the first run, between output times by cubics with its own slopes: no proof."""
+    t, x, slope = runs.t, runs.x[0], runs.slope[0]
+    parts = -(-_POINTS // len(t))
+    s, dt = np.arange(parts)[:, None, None] / parts, np.diff(t)[:, None]
+    between = (1 - s) ** 2 * (1 + 2 * s) * x[:-1] + s**2 * (3 - 2 * s) * x[1:]
+    between += s * (1 - s) * dt * ((1 - s) * slope[:-1] - s * slope[1:])
+    times = (t[:-1] + s[..., 0] * dt[:, 0]).ravel()
+    curve = np.concatenate([x, between.reshape(len(times), -1)])  # x: up to where a run was stopped
+    return _of_curve(setting.spec, np.concatenate([t, times]), curve)
+
+
+def _of_curve(spec: Spec, t: Array, x: Array) -> tuple[Clearance, ...]:
+    """That of a curve (K, n) at times (K,); nan where it has ended."""
+    found = []
+    for number, obstacle in enumerate(spec.obstacles):
+        gaps = np.nan_to_num(signed_distance(obstacle, in_plane(spec, obstacle, x)), nan=np.inf)
+        step = int(np.argmin(gaps))
+        gap = float(gaps[step])
+        found.append(Clearance(obstacle=number, clearance=_finite(gap), t=float(t[step]), collides=gap <= 0))
+    return tuple(found)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,283 @@
+"""What is simulated: plan, times, starts, what a certificate proves; loops, their gains, and what they promise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Final
+
+import numpy as np
+
+from tubecert.bounds.wind import Beside
+from tubecert.certificate.result import Result
+from tubecert.coordinates import Coordinates, Fields
+from tubecert.digits import near
+from tubecert.enclosure.interval import Array
+from tubecert.enclosure.tape import Tape
+from tubecert.errors import TubecertError
+from tubecert.expression import Expression
+from tubecert.expression.matrix import Matrix, column, combine, multiply
+from tubecert.findings import Finding
+from tubecert.kinds import DISTANCE, name_of
+from tubecert.model import ControlAffineModel, build
+from tubecert.simulation.adaptive.loops import DESIGNS, Controller
+from tubecert.simulation.adaptive.problem import LoopGains, LoopProblem
+from tubecert.simulation.adaptive.reading import Certified, Promise, certified_plan, promise
+from tubecert.simulation.adaptive.uncertainty import Class, Sources, class_of
+from tubecert.spec import Spec
+from tubecert.trajectory import Plan
+
+TIMES: Final = 251  # output times of the loops that are drawn
+CHOSEN: Final = "chosen, not certified"
+_LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
+_TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
+_LIMIT: Final = 100  # of the greatest radius: what is further away from the plan is not followed any more
+_DEGREE: Final = 5  # of the polynomials that geodesics are
+_EVEN, _EVEN_DEGREE = 1.01, 3  # where M varies by a factor of less over the tube, cubic ones are as near
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Setting:
+    """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0.
+
+    `spread` (n,): how far from x0 they may be, state by state. `E` (n, k) is that of the wind, `rest` (n, 1) what
+    unknown parameters do that no input can. `uncertainty` is the class of what may act.
+    """
+
+    spec: Spec
+    certified: Certified
+    model: ControlAffineModel
+    plan: Plan
+    horizon: float
+    times: Array
+    x0: Array
+    centre: Array
+    within: float
+    spread: Array
+    uncertainty: Class
+    E: Matrix
+    rest: Matrix
+    h: tuple[Expression, ...] | None
+    layer: float
+
+    @property
+    def varied(self) -> bool:
+        """Whether there is more than one start."""
+        return self.within > 0 or bool(self.spread.any())
+
+    def started(self, direction: Array, radius: float = 1.0) -> Array:
+        """The start (n,) in a direction: at a part of the radius of the ball, or in the box (|direction_i| <= 1)."""
+        if self.within:
+            length = float(np.linalg.norm(direction)) or 1.0
+            return np.asarray(self.centre + self.within * radius * direction / length)
+        return np.asarray(self.x0 + self.spread * direction)
+
+    def along(self, plan: Plan) -> Setting:
+        """The same around another plan of the family that is certified; the state starts on it, or `within` of it."""
+        start = _start_of(plan)
+        return replace(self, plan=plan, x0=start, centre=start)
+
+    @property
+    def rho(self) -> float:
+        """The radius of the tube, in z."""
+        return self.certified.rho
+
+    @property
+    def S(self) -> Array:
+        """The coordinates z = S x of the tube, (n, n)."""
+        return self.certified.S
+
+    @property
+    def greatest_radius(self) -> float:
+        """|x - x*| is at most this where |S (x - x*)| <= rho."""
+        return self.rho * float(np.linalg.norm(np.linalg.inv(self.S), 2))
+
+    @property
+    def reach(self) -> float:
+        """dbar = sqrt(a) rho."""
+        return self.certified.reach
+
+    @property
+    def tolerance(self) -> float:
+        """The error of |S x| that the integrator is asked for."""
+        return _TOLERANCE * self.rho
+
+    @property
+    def half_widths(self) -> Array:
+        """Bounds of |x_i - x_i*| in the tube, (n,)."""
+        return np.array([self.certified.half_widths[name] for name in self.spec.states])
+
+
+def setting_of(
+    spec: Spec, result: Result, duration: Fraction | None = None, plan: Plan | None = None
+) -> Setting:
+    """The setting of a specification and its certification, which has a tube; `plan` is one of a family.
+
+    Raises `TubecertError` where the certificate lacks what is needed, or the plan is too short.
+    """
+    model, certified = build(spec), Certified.of(result)
+    single = certified_plan(spec, model, result) if plan is None else plan
+    horizon = horizon_of(spec, duration)
+    wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
+    centre, fields = _start_of(single), Fields(model, _coordinates(result))
+    return Setting(
+        spec=spec,
+        certified=certified,
+        model=model,
+        plan=single,
+        horizon=horizon,
+        times=np.linspace(0.0, horizon, TIMES),
+        x0=centre if plan is not None else np.array([float(value) for value in spec.x0]),
+        centre=centre,
+        within=0.0 if spec.within is None else float(spec.within),
+        spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
+        uncertainty=class_of(certified, len(spec.states), len(spec.inputs), _sources(certified, model)),
+        E=_wind(model, fields),
+        rest=_rest(model, fields),
+        h=None if wanted is None else tuple(term.expression for term in wanted),
+        layer=_LAYER * certified["metric_input_gain"] * certified.reach,
+    )
+
+
+def horizon_of(spec: Spec, duration: Fraction | None) -> float:
+    """The duration asked for; else the plan's horizon; else ten time constants of the metric."""
+    wanted = duration or (spec.simulation.duration if spec.simulation else None) or spec.trajectory.horizon
+    if wanted is None:
+        assert spec.metric is not None
+        wanted = 10 / spec.metric.rate
+    if spec.trajectory.horizon is not None and wanted > spec.trajectory.horizon:
+        message = f"the plan ends at {near(spec.trajectory.horizon)} s, before {near(wanted)} s"
+        raise TubecertError([Finding(code="TC704", message=message, help="ask for a shorter duration")])
+    return float(wanted)
+
+
+def _start_of(plan: Plan) -> Array:
+    """x*(0), (n,)."""
+    return Tape(plan.start, ()).run_floats([], ())
+
+
+def _coordinates(result: Result) -> Coordinates | None:
+    rows = None if result.tube is None else result.tube.coordinates
+    return None if rows is None else Coordinates(tuple(tuple(map(Fraction, row)) for row in rows))
+
+
+def _sources(certified: Certified, model: ControlAffineModel) -> Sources | None:
+    """What acts beside h; None if nothing does."""
+    if not model.E and not model.parameters:
+        return None
+    ranges = [[float(low), float(high)] for _, (low, high) in model.parameters]
+    return Sources(
+        pace=certified.rate,
+        k=len(model.E[0]) if model.E else 0,
+        wind=float(model.wind_bound or 0),
+        ranges=np.array(ranges).reshape(-1, 2),
+    )
+
+
+def _rest(model: ControlAffineModel, fields: Fields) -> Matrix:
+    """What unknown parameters do that no input can; the rest of it is a part of h, as large as the class allows."""
+    if not model.drift:
+        return ()
+    unknown = combine(1, column(model.drift), -1, column(model.f))
+    return combine(1, unknown, -1, multiply(model.B, column(Beside(fields).known)))
+
+
+def _wind(model: ControlAffineModel, fields: Fields) -> Matrix:
+    """E, or where w has a rate (I - B B^+) E: the rest of it is a part of h, which is as large as the class allows."""
+    if model.wind_rate is None:
+        return model.E
+    reached = multiply(fields.B_pinv, fields.of_vector(model.E))
+    return combine(1, model.E, -1, multiply(model.B, reached))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What the command line says about gains: the kind of certificate that has them, and what replaces its numbers."""
+
+    source: str = DISTANCE.option
+    bandwidth: Fraction | None = None
+    adaptation_rate: Fraction | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Loop:
+    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one."""
+
+    problem: LoopProblem
+    origin: str
+    promise: Promise | None
+
+    def along(self, plan: Plan) -> Loop:
+        """The same around another plan."""
+        return replace(self, problem=replace(self.problem, plan=plan))
+
+    @property
+    def controller(self) -> Controller:
+        """Its controller."""
+        return self.problem.controller
+
+    @property
+    def tested(self) -> bool:
+        """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
+        return self.problem.terms.predicts
+
+
+def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
+    """A loop with its gains; raises `TubecertError` if there are none for it."""
+    if setting.model.gained:
+        where = setting.spec.location("system.B")
+        message = "parameters known by ranges stand in B, and the loops are stated for a known B"
+        help = "give each of them one value: --set system.parameters.NAME=VALUE"
+        raise TubecertError([Finding(code="TC705", message=message, location=where, help=help)])
+    terms, kind, own = DESIGNS[controller].terms, name_of(choice.source), setting.certified
+    gains, covered = _gains(setting, controller, choice) if terms.filters else (None, False)
+    problem = LoopProblem(
+        model=setting.model,
+        plan=setting.plan,
+        controller=controller,
+        horizon=setting.horizon,
+        times=setting.times,
+        gains=gains,
+        limit=_LIMIT * setting.greatest_radius,
+        degree=_EVEN_DEGREE if _even(own) else _DEGREE,
+        P=own.S.T @ own.S,
+        E=setting.E,
+        rest=setting.rest,
+    )
+    return Loop(
+        problem=problem,
+        origin="no adaptation" if gains is None else f"certified by {kind}" if covered else CHOSEN,
+        promise=promise(own, kind) if covered and terms.predicts else None,
+    )
+
+
+def _even(own: Certified) -> bool:
+    """Whether a S'S <= M <= A S'S with nearly the same a and A over the tube: geodesics hardly bend there."""
+    return own.upper is not None and own.upper <= _EVEN * (own.reach / own.rho) ** 2
+
+
+def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[LoopGains, bool]:
+    """The gains of a loop that filters, and whether they are those that a certificate proves."""
+    adapts, kind = DESIGNS[controller].terms.adapts, name_of(choice.source)
+    proven, smooth = setting.certified.proven(kind), setting.spec.adaptation.smooth
+    bandwidth = choice.bandwidth or (None if proven is None else proven.bandwidth)
+    rate = choice.adaptation_rate or (None if proven is None else proven.adaptation_rate)
+    if bandwidth is None or (adapts and rate is None):
+        lacks = ("--bandwidth", bandwidth is None), ("--adaptation-rate", adapts and rate is None)
+        options = " and ".join(option for option, missing in lacks if missing)
+        message = f"{kind} certifies no gains for the controller {controller}"
+        help = f"choose {options} (then nothing is covered by the certificate), or another --gains"
+        raise TubecertError([Finding(code="TC705", message=message, help=help)])
+    # R_H where no certificate gives one: Dh, with what the smooth layer needs
+    radius = setting.uncertainty.h * math.sqrt(1 + float(smooth or 0)) * (1 + 1e-6) or 1.0
+    gains = LoopGains(
+        bandwidth=float(bandwidth),
+        adaptation_rate=None if rate is None else float(rate),
+        projection_radius=float(proven.projection_radius) if proven else radius,
+        predictor_gain=float(proven.predictor_gain if proven else bandwidth),
+        smooth=None if smooth is None or not adapts else float(smooth),
+    )
+    if proven is None or bandwidth != proven.bandwidth:
+        return gains, False
+    return gains, not adapts or rate == proven.adaptation_rate

@@ -1,0 +1,225 @@
+"""Uncertainties within a declared class: random members, and adversaries; each is in the class by construction.
+
+The class: |h| <= Dh, |h_x| <= Dhx, |h_t| <= Dht, and |h(0, x(0))| <= H0, the constants of a certificate. A sum of waves
+a_k sin(w_k t + q_k'(x - centre) + p_k) has |h| <= sum |a_k|, |h_x| <= sum |a_k||q_k| and |h_t| <= sum |a_k| w_k.
+
+An adversary is a triangular wave in w t + q'(x - centre) + p: it moves as fast as the class allows all the time, and a
+filter of bandwidth omega misses of h what it moves within 1/omega. Its Fejer mean is used, which has the bounds of the
+triangle: slope at most 1, and no overshoot. Where metric and inputs are constant, a part of h may push along B'M g_s.
+
+Genes (N, G) in [0, 1] describe N members, one for each lane, and what acts beside them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.simulation.adaptive.problem import Beside, Disturbance, nothing_beside
+from tubecert.simulation.adaptive.reading import Certified
+
+WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
+_ROUND: Final = 1 - 1e-9  # sums of floats stay within the class
+_UNEVEN: Final = 1.5  # a power: shares of h among the waves of a random member
+_FAINT: Final = 0.3  # of the random members use only a part of |h|
+_HALVINGS: Final = 60  # until a start is what |h(0, x(0))| allows
+_TINY: Final = float(np.finfo(float).tiny)
+_NOWHERE: Final = 1 - 1e-9  # twice the genes that have no direction: none has them
+_STEADY: Final = 0.2  # below, a wind never turns round
+_ENDS: Final = 1.6  # parameters lie at the ends of their ranges in 3 of 8 cases
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Class:
+    """Bounds of |h|, |h_x|, |h_t| and |h(0, x(0))|, n states, m inputs.
+
+    `push` bounds how fast B'M gamma_s changes with x, and with t along the plan; None where that is not known.
+    `sources` are those of wind and unknown parameters, if there are any.
+    """
+
+    h: float
+    h_x: float
+    h_t: float
+    h_initial: float
+    n: int
+    m: int
+    push: tuple[float, float] | None = None
+    sources: Sources | None = None
+
+    @property
+    def adversary(self) -> int:
+        """How many genes describe an adversary."""
+        return 4 + self.n + self.m
+
+    @property
+    def member(self) -> int:
+        """How many describe a random member."""
+        return 6 + WAVES * (4 + self.n + self.m)
+
+    @property
+    def beside(self) -> int:
+        """How many describe wind and unknown parameters."""
+        return 0 if self.sources is None else 3 + self.sources.k + len(self.sources.ranges)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sources:
+    """What acts beside h: |w| <= `wind` for a w of k entries, parameters in `ranges` (p, 2); `pace` lambda, 1/s."""
+
+    pace: float
+    k: int
+    wind: float
+    ranges: Array
+
+
+class Waves(NamedTuple):
+    """N members: amplitude (N, W, m), frequency (N, W), wave (N, W, n), phase (N, W) and push (N,)."""
+
+    amplitude: Array
+    frequency: Array
+    wave: Array
+    phase: Array
+    push: Array
+
+
+def class_of(certified: Certified, n: int = 0, m: int = 0, sources: Sources | None = None) -> Class:
+    """The class that a certificate is about; pushes only where the metric and B are constant."""
+    constants = {name: certified[name] for name in ("h", "h_x", "h_t", "h_initial")}
+    flat = certified["M_x"] == 0 and certified["B_x"] == 0
+    push = None
+    if flat and certified.upper is not None:
+        slope = certified["B"] * certified.upper
+        push = slope, slope * (certified["drift_on_plan"] + certified["plan_defect"])
+    return Class(**constants, n=n, m=m, push=push, sources=sources)
+
+
+def random_members(kind: Class, genes: Array, offset: Array) -> Waves:
+    """Random members for starts that are `offset` (N, n) from the centre; often at the limits of the class."""
+    own, each = genes[:, :6], genes[:, 6:].reshape(len(genes), WAVES, -1)
+    raw = (-np.log1p(-each[..., 0])) ** _UNEVEN
+    part = np.where(own[:, 0] < _FAINT, own[:, 1], 1.0)[:, None]
+    size = kind.h * _ROUND * part * raw / np.maximum(raw.sum(axis=1, keepdims=True), _TINY)
+    rates, steepness = (
+        _budgeted(10 ** (2.5 * each[..., 1 + i] - 1.5), size, bound * _share(own[:, 2 + 2 * i : 4 + 2 * i]))
+        for i, bound in enumerate((kind.h_t, kind.h_x))
+    )
+    amplitude, wave = size[..., None] * _unit(each[..., 4 : 4 + kind.m]), _unit(each[..., 4 + kind.m :])
+    wave *= steepness[..., None]
+    base = np.einsum("nwi,ni->nw", wave, offset)
+    angle = np.remainder(base + 2 * np.pi * each[..., 3] + np.pi, 2 * np.pi) - np.pi
+    push = np.zeros(len(genes))
+    return Waves(amplitude, rates, wave, _begun(kind, amplitude, angle, push) - base, push)
+
+
+def _share(genes: Array) -> Array:
+    """How much of a bound is used: all of it, half of the time."""
+    return np.asarray(np.where(genes[:, 0] < 0.5, _ROUND, genes[:, 1]))
+
+
+def _budgeted(raw: Array, size: Array, budget: Array) -> Array:
+    """The rates (N, W), scaled so that sum size * rate is the budget (N,)."""
+    used = np.sum(size * raw, axis=1)
+    return np.asarray(raw * np.where(used > 0, budget / np.maximum(used, _TINY), 0.0)[:, None])
+
+
+def triangle(waves: int) -> tuple[Array, Array]:
+    """Odd harmonics (W,) and coefficients (W,) of a triangular wave of slope at most 1, as a Fejer mean."""
+    j = np.asarray(2.0 * np.arange(waves) + 1)
+    weight = 1 - j / (2 * waves + 1)
+    return j, np.asarray(4 / np.pi * weight * (-1.0) ** np.arange(waves) / j**2)
+
+
+def adversaries(kind: Class, genes: Array, offset: Array, layer: float) -> Waves:
+    """Those of genes for frequency, phase, shares of h_x and push, directions; starts as for random members.
+
+    Whatever the frequency, the wave moves as fast, or as far, as the class allows.
+    """
+    (j, c), last = triangle(WAVES), 4 + kind.n
+    frequency = 10.0 ** (3 * genes[:, 0] - 1.5) * (kind.h_t / kind.h if kind.h > 0 else 1.0)
+    push, slope, rate = _pushed(kind, genes[:, 3], layer)
+    room = [bound * _ROUND - used for bound, used in ((kind.h, push), (kind.h_x, slope), (kind.h_t, rate))]
+    height = np.maximum(0.0, np.minimum(room[0] / np.abs(c).sum(), _over(room[2], frequency)))
+    steepness = np.where(height > 0, genes[:, 2] * _over(room[1], height), 0.0)
+    q = steepness[:, None] * _unit(genes[:, 4:last])
+    wave = j[:, None] * q[:, None, :]
+    amplitude = (height[:, None] * c)[..., None] * _unit(genes[:, last : last + kind.m])[:, None, :]
+    base = np.einsum("ni,ni->n", q, offset)
+    angle = np.remainder(base + 2 * np.pi * genes[:, 1] + np.pi, 2 * np.pi) - np.pi
+    begun = _begun(kind, amplitude, angle[:, None] * j, push)
+    return Waves(amplitude, frequency[:, None] * j, wave, begun - base[:, None] * j, push)
+
+
+def _pushed(kind: Class, share: Array, layer: float) -> tuple[Array, Array, Array]:
+    """The push, and what it uses of |h_x| and |h_t|: its direction turns at most by 1/layer of what it follows."""
+    slope, rate = (value / layer for value in kind.push or (0.0, 0.0))
+    most = 0.0
+    if kind.push is not None:
+        most = min(kind.h, *(b / a for a, b in ((slope, kind.h_x), (rate, kind.h_t)) if a > 0))
+    push = share * most * _ROUND
+    return push, push * slope, push * rate
+
+
+def _over(a: Array, b: Array) -> Array:
+    """a / b, infinite where b is 0."""
+    return np.asarray(np.divide(a, b, out=np.full(a.shape, np.inf), where=b > 0))
+
+
+def _unit(genes: Array) -> Array:
+    """Directions (..., n)."""
+    vector = 2 * genes - _NOWHERE
+    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), _TINY))
+
+
+def _begun(kind: Class, amplitude: Array, angle: Array, push: Array) -> Array:
+    """The angles (N, W) of the waves at the start, moved towards zeros as |h(0, x(0))| <= H0 asks for, all alike."""
+    room = np.maximum(0.0, kind.h_initial - push)
+
+    def fits(share: Array) -> Array:
+        h = np.einsum("nw,nwm->nm", np.sin(share[:, None] * angle), amplitude)
+        return np.asarray(np.linalg.norm(h, axis=1) <= room)
+
+    low, high = np.zeros(len(angle)), np.ones(len(angle))
+    low = np.where(fits(high), 1.0, low)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        good = fits(middle)
+        low, high = np.where(good, middle, low), np.where(good, high, middle)
+    return np.asarray(low[:, None] * angle)
+
+
+def beside_of(kind: Class, genes: Array) -> Beside:
+    """Genes of N lanes: the aim of the wind, how fast it turns, its phase, its direction, the parameters."""
+    own = kind.sources
+    if own is None:
+        return nothing_beside(len(genes))
+    low, high = own.ranges.T
+    turns = np.where(genes[:, 1] > _STEADY, own.pace * 10 ** (4 * genes[:, 1] - 1), 0.0)
+    return Beside(
+        wind=np.full(len(genes), own.wind * _ROUND),
+        aim=np.floor(2.999 * genes[:, 0]),
+        blowing=_unit(genes[:, 3 : 3 + own.k]),
+        gusting=np.stack([turns, 2 * np.pi * np.where(turns > 0, genes[:, 2], 0.25)], axis=1),
+        theta=low + (high - low) * np.clip(_ENDS * (genes[:, 3 + own.k :] - 0.5) + 0.5, 0.0, 1.0),
+    )
+
+
+def usual(kind: Class) -> Beside:
+    """A wind that blows outward and does not turn, beside an h that is given."""
+    genes = np.full((1, kind.beside), 0.5)
+    genes[:, 1:2] = 0.0
+    return beside_of(kind, genes)
+
+
+def acting(kind: Class, waves: Waves, genes: Array, centre: Array, layer: float) -> Disturbance:
+    """Members and what acts beside them; what it adds up to is clipped beside a wind only: every h is in the class."""
+    return Disturbance(
+        base=None,
+        **waves._asdict(),
+        radius=np.full(len(genes), kind.h if kind.sources else np.inf),
+        centre=centre,
+        beside=beside_of(kind, genes),
+        layer=layer,
+    )

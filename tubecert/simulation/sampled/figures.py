@@ -1,0 +1,74 @@
+"""A campaign as files: summary, runs, and figures of what runs attained over time, and in the plane. Trusted: no."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tubecert.enclosure.interval import Array
+from tubecert.simulation.folder import npz
+from tubecert.simulation.plots import COLORS, TUBE, blank, images, labelled, names_of, plane, titled
+from tubecert.simulation.sampled.campaign import Campaign
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_GROUPS: Final = (("random runs", COLORS["nominal"]), ("adversaries", COLORS["l1"]))
+_BOXES: Final = 400  # cross-sections of the tube that are drawn
+_KEPT: Final = ("share", "when", "value", "bound", "left", "slack")
+
+
+def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
+    """Of a campaign of one run at least, beside its summary; the same campaign gives the same bytes."""
+    arrays = {name: campaign.all(name) for name in _KEPT} | {"names": np.array(campaign.setting.names)}
+    yield "runs.npz", npz({**arrays, "profile": campaign.profile, "aimed": campaign.aimed})
+    yield from images(DRAWERS, campaign)
+
+
+def _title(campaign: Campaign) -> str:
+    return f"{campaign.setting.spec.name}: {campaign.runs} runs of the sampled loop"
+
+
+def _tube_use(campaign: Campaign) -> Figure:
+    """Every state and input over time: bounds, stage by stage, and the largest deviations of all runs."""
+    own = campaign.setting
+    figure = blank(7.0, 0.9 + 1.5 * len(own.names))
+    axes = figure.subplots(len(own.names), 1, sharex=True, squeeze=False)[:, 0]
+    t = np.arange(own.samples) * own.Ts
+    bounds = np.hstack([own.at(k) for k in range(own.samples)])
+    for i, (axis, name) in enumerate(zip(axes, own.names, strict=True)):
+        axis.fill_between(t, 0, bounds[i], step="post", color=TUBE, alpha=0.25, lw=0, label="tube")
+        for (label, color), profile in zip(_GROUPS, campaign.profile, strict=True):
+            axis.plot(t, profile[i] * bounds[i], color=color, lw=1.0, label=label)
+        axis.set_ylabel(labelled(own.spec, name, f"|{name} - {name}*|"))
+        axis.set_ylim(0, None)
+    axes[-1].set_xlabel("t [s]")
+    axes[-1].set_xlim(0, t[-1] if len(t) > 1 else None)
+    titled(figure, axes[0], _title(campaign), 3)
+    return figure
+
+
+def _plane(campaign: Campaign) -> Figure | None:
+    """The plane of two states: plan, tube, obstacles and some runs."""
+    own, names = campaign.setting, names_of(campaign.setting.spec)
+    if names is None:
+        return None
+    i, j = (own.spec.states.index(name) for name in names)
+    plan, boxes = None, list[Array]()
+    if own.spec.trajectory.bundle is None:
+        plan = campaign.found[0].course.x[:: len(own.lengths), [i, j], 0]
+        shown = np.unique(np.linspace(0, own.samples - 1, _BOXES).astype(int))
+        corners: Array = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
+        boxes = [plan[k] + corners * own.at(k)[[i, j], 0] for k in shown]
+    figure, axis = plane(own.spec, names, boxes, plan)
+    path = campaign.found[0].path
+    axis.plot(path[:, i], path[:, j], color=COLORS["l1"], lw=0.5, alpha=0.5)
+    axis.plot([], [], color=COLORS["l1"], lw=0.5, label="some runs")
+    axis.autoscale_view()
+    titled(figure, axis, _title(campaign), 4)
+    return figure
+
+
+DRAWERS: Final[Mapping[str, Callable[[Campaign], Figure | None]]] = {"tube_use": _tube_use, "plane": _plane}
