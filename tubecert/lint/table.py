@@ -74,13 +74,9 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
     """What is amiss with a plan file that can be read; `radius` is that of the least tube."""
     knots = table.knots
     if table.begins:
-        yield Finding(
-            code=PLAN_TIMES,
-            severity=Severity.NOTE,
-            message=f"the plan begins at t = {number_text(table.begins)[:40]} s, which is t = 0 from here on",
-            location=table.rows[0],
-            help="horizon, h and every t of the certificate count from there",
-        )
+        begins = f"the plan begins at t = {number_text(table.begins)[:40]} s, which is t = 0 from here on"
+        help = "horizon, h and every t of the certificate count from there"
+        yield replace(_finding(PLAN_TIMES, begins, table.rows[0], help), severity=Severity.NOTE)
     rows = np.array([*map(floats, knots.u)])
     each = 2 if knots.interpolation == "hermite-simpson" else 1
     points = _Points(

@@ -13,10 +13,9 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final, TypeAlias
+from typing import Final
 
 from tubecert.expression import suggestion
 from tubecert.findings import capped
@@ -31,7 +30,7 @@ from tubecert.spec.sheet import ENOUGH, Cell, Sheet, number, opened, rows
 from tubecert.spec.values import Interpolation, Knots, Table
 
 MAX_ROWS: Final = 10_001
-_COLUMN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}", re.ASCII)
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}", re.ASCII)
 _ABSENT: Final = ("", "nan")
 
 
@@ -45,25 +44,22 @@ class Column:
     """What its numbers are multiplied by: 1/1000 for ms, 1 deg for degrees."""
 
 
-Columns: TypeAlias = Mapping[str, Column]
-
 _COLUMN: Final = section(Column)
-_ITSELF: Final = Column()
 
 
-def _read_columns(field: Field, names: Names) -> dict[str, Column] | None:
-    """The columns that are not called as what they hold, or are in another unit."""
+def _read_columns(field: Field, names: Names) -> tuple[Column, ...] | None:
+    """The columns of t, the states and the inputs."""
     fields = field.mapping(optional=_variables(names)) or {}
-    found = {
-        name: Column(name=own.node.text) if isinstance(own.node, Scalar) else _COLUMN.read(own, names)
-        for name, own in fields.items()
-    }
-    return None if None in found.values() else found
+    found = [_read_column(name, fields.get(name), names) for name in _variables(names)]
+    sound = tuple(column for column in found if column is not None)
+    return sound if len(sound) == len(found) else None
 
 
-def _called(name: str, columns: Columns) -> str:
-    """The name of a column in the file."""
-    return columns.get(name, _ITSELF).name or name
+def _read_column(name: str, field: Field | None, names: Names) -> Column | None:
+    if field is not None and isinstance(field.node, Scalar):
+        return Column(name=field.node.text)
+    found: Column | None = Column() if field is None else _COLUMN.read(field, names)
+    return found and replace(found, name=found.name or name)
 
 
 COLUMNS: Final = keys.Kind(
@@ -73,7 +69,7 @@ COLUMNS: Final = keys.Kind(
 
 
 def read_table(
-    entry: Field, columns: Columns | None, names: Names, interpolation: Interpolation
+    entry: Field, columns: tuple[Column, ...] | None, names: Names, interpolation: Interpolation
 ) -> Table | None:
     """The plan file that a specification names, relative to the specification's own folder."""
     file = opened(entry)
@@ -96,12 +92,11 @@ def read_table(
     )
 
 
-def _rows(sheet: Sheet, columns: Columns | None, names: Names) -> list[list[Fraction]] | None:
+def _rows(sheet: Sheet, columns: tuple[Column, ...] | None, names: Names) -> list[list[Fraction]] | None:
     """The rows as t, states, inputs."""
     lines = rows(sheet, "a plan")
     header = next(lines, None)
-    variables = _variables(names)
-    wanted = tuple(_called(name, columns or {}) for name in variables)
+    wanted = _variables(names) if columns is None else tuple(column.name for column in columns)
     if sheet.findings:
         return None
     if header is None:
@@ -112,7 +107,7 @@ def _rows(sheet: Sheet, columns: Columns | None, names: Names) -> list[list[Frac
     if places is None:
         return None
     sheet.note(header)
-    scales = [(columns or {}).get(name, _ITSELF).scale for name in variables]
+    scales = [column.scale for column in columns or ()] or [Fraction(1)] * len(wanted)
     reader = _Rows(sheet, len(header), places, scales, inputs=len(names.inputs))
     values: list[list[Fraction]] = []
     for row in lines:
@@ -168,7 +163,7 @@ def _columns(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, other
         )
         return None
     # of columns with names that a stranger chose nothing is shown before a row of numbers
-    sheet.shown = not others and all(_COLUMN_NAME.fullmatch(cell.text) for cell in header)
+    sheet.shown = not others and all(_NAME.fullmatch(cell.text) for cell in header)
     place = _placed(sheet, header, wanted, others=others)
     missing = [name for name in wanted if name not in place]
     if missing and not sheet.findings:
@@ -186,8 +181,7 @@ def _placed(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, others
         elif cell.text in wanted:
             place[cell.text] = index
         elif not others:
-            shown = _COLUMN_NAME.fullmatch(cell.text)
-            said = f"{cell.text!r}" if shown else f"the name of column {index + 1}"
+            said = f"{cell.text!r}" if _NAME.fullmatch(cell.text) else f"the name of column {index + 1}"
             message = f"{said} is neither t nor a state nor an input"
             help = suggestion(cell.text, wanted, what="columns") if sheet.shown else _wanted(wanted)
             help += "; trajectory.columns names columns, and skips others"
