@@ -193,6 +193,27 @@ def test_knots_outside_are_found(tmp_path):
     assert "t = 1" in finding.message
 
 
+@pytest.mark.parametrize("unit", ["deg", "degrees", "\u00b0"])
+def test_degrees_in_a_sine_are_told(unit):
+    """V10: certified without a word."""
+    text = changed(("  states: [p, v]", f"  units: {{p: {unit}, v: {unit}/s, u: N}}\n  states: [p, v]"))
+    assert found(text) == []  # nothing but sums
+    [note] = found(text.replace("-k*p", "-k*sin(p)").replace("rate: 0.4", "rate: 0.3"))
+    assert (note.code, note.severity, str(note.location)[-4:]) == ("TC132", Severity.NOTE, "4:14")
+    assert "sin(p) takes radians" in note.message
+    assert found(text.replace("-k*p", "-k*sin(pi/180*p)").replace("rate: 0.4", "rate: 0.1")) == []
+
+
+def test_a_plan_file_in_degrees_is_taken_for_one(tmp_path):
+    (tmp_path / "plan.csv").write_text(CSV % "-17.2")
+    for f, told in (("-k*p", False), ("-k*sin(p)", True)):
+        (tmp_path / "spec.yaml").write_text(changed((HELD, "{kind: csv, file: plan.csv}"), ("-k*p", f)))
+        [finding] = [
+            item for item in pipeline.inspect(load(str(tmp_path / "spec.yaml"))) if item.code == "TC403"
+        ]
+        assert ("{p: {scale: 1 deg}}" in finding.help) is told
+
+
 def test_a_target_outside_is_found_before_planning():
     plan = "{kind: ilqr, target: [0, 9], horizon: 5}"
     assert "TC403" in {item.code for item in found(changed((HELD, plan)))}

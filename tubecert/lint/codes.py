@@ -38,7 +38,7 @@ NOTABLE_DEFECT: Final = 0.02  # share of the tube that a plan's defect may take
 CODES: Final[Mapping[str, str]] = {
     UNUSED: "a parameter or a definition is never used",
     CONFUSABLE: "two names, or a name and a function, are easily confused",
-    UNITS: "some states or inputs have a unit and others have none",
+    UNITS: "some states or inputs have no unit, or one that the expressions do not suit",
     IDLE_STATE: "a state cannot change",
     EMPTY_EXPECTATION: "an expectation that expects nothing",
     NOT_POSITIVE: "a mass, an inertia or a length is not positive",

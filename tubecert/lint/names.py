@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from itertools import combinations
 
-from tubecert.expression import FUNCTIONS, ZERO, number_text
+from tubecert.expression import FUNCTIONS, ZERO, Expression, free_symbols, number_text, to_text, topological
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import codes
 from tubecert.spec import Spec
@@ -15,6 +15,7 @@ _WORDS = (*FUNCTIONS, "pi", "t")
 # of a cart and its pendulum: masses m and M, a length l beside an inertia I; a current i beside one
 _CUSTOMARY = {frozenset(pair) for pair in ("mM", "lI", "iI", "rR")}
 _BODY = re.compile(r"(?:m|M|J|I|l|L)(?:\d+|_\w+)?|[IJ][xyz]{1,2}|(?:mass|inertia|length)\w*", re.ASCII)
+_DEGREES = re.compile(r"\bdeg(rees?)?\b|°")
 _ALIKE = str.maketrans({"O": "0", "o": "0", "l": "1", "I": "1", "i": "1"})
 
 
@@ -25,6 +26,7 @@ def name_findings(spec: Spec) -> list[Finding]:
         *_confusable(spec),
         *_negative(spec),
         *_units(spec),
+        *_degrees(spec),
         *_idle(spec),
         *_expectation(spec),
     ]
@@ -115,6 +117,27 @@ def _units(spec: Spec) -> Iterator[Finding]:
             location=spec.location("system.units"),
             help='write "1" for what has no dimension',
         )
+
+
+def turned(spec: Spec, name: str) -> list[Expression]:
+    """Sines, cosines and tangents of a state in f, B and h, but of those that turn degrees into radians by pi."""
+    terms = [*spec.f, *(term for row in spec.B for term in row), *(spec.uncertainty.h or ())]
+    found = [e for e in topological([term.expression for term in terms]) if e.op in ("sin", "cos", "tan")]
+    return [
+        e for e in found if name in free_symbols(e.args) and all(n.op != "pi" for n in topological(e.args))
+    ]
+
+
+def _degrees(spec: Spec) -> Iterator[Finding]:
+    for name, unit in spec.units:
+        if _DEGREES.search(unit) and (own := turned(spec, name)):
+            yield Finding(
+                code=codes.UNITS,
+                severity=Severity.NOTE,
+                message=f"{name} is in {unit}, and {to_text(own[0])[:60]} takes radians",
+                location=spec.location(f"system.units.{name}"),
+                help=f"let {name} be in rad (numbers may be written in degrees: 30 deg), or write pi/180*{name} there",
+            )
 
 
 def _idle(spec: Spec) -> Iterator[Finding]:

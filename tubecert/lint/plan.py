@@ -19,6 +19,7 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.floats import floats, nearest
+from tubecert.lint.names import turned
 from tubecert.lint.table import paid, table_findings
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.spec import Obstacle, Spec, Vector
@@ -115,11 +116,15 @@ def _outside(spec: Spec, curve: _Curve) -> Iterator[Finding]:
     scale = float(np.max(np.abs(_sides(spec))))
     if beyond > (0.0 if len(curve.t) == 1 else _ROUNDING * scale):
         when = "" if len(curve.t) == 1 else f" at t = {near(curve.t[k], 4)} s"
+        name, help = spec.states[i], f"enlarge safe_set.{spec.states[i]}, or plan inside it"
+        low, high = map(nearest, spec.safe_set[i])
+        if spec.trajectory.table and turned(spec, name) and low <= math.radians(curve.x[k, i]) <= high:
+            help += f"; a column in degrees is said by trajectory.columns: {{{name}: {{scale: 1 deg}}}}"
         yield Finding(
             code=codes.PLAN_OUTSIDE,
-            message=f"the plan leaves the safe set{when}: {spec.states[i]} = {near(curve.x[k, i])}",
+            message=f"the plan leaves the safe set{when}: {name} = {near(curve.x[k, i])}",
             location=spec.location(curve.path),
-            help=f"enlarge safe_set.{spec.states[i]}, or plan inside it",
+            help=help,
         )
 
 
