@@ -76,23 +76,29 @@ def read_table(
     if file is None:
         return None
     sheet = file.sheet
-    found = _rows(sheet, columns, names)
-    knots = None if found is None else _knots(sheet, found, len(names.states), interpolation)
+    found, n = _rows(sheet, columns, names, interpolation), len(names.states)
     entry.reader.findings.extend(capped(sheet.findings, codes.LIMIT, ENOUGH))
-    if found is None or knots is None or sheet.findings:
+    if found is None or sheet.findings:
         return None
     header, *lines = sheet.lines
     return Table(
         file=file.name,
         sha256=hashlib.sha256(file.data).hexdigest(),
-        knots=knots,
+        knots=Knots(
+            t=tuple(row[0] - found[0][0] for row in found),
+            x=tuple(tuple(row[1 : n + 1]) for row in found),
+            u=tuple(tuple(row[n + 1 :]) for row in found),
+            interpolation=interpolation,
+        ),
         begins=found[0][0],
         header=header,
         rows=tuple(lines),
     )
 
 
-def _rows(sheet: Sheet, columns: tuple[Column, ...] | None, names: Names) -> list[list[Fraction]] | None:
+def _rows(
+    sheet: Sheet, columns: tuple[Column, ...] | None, names: Names, interpolation: Interpolation
+) -> list[list[Fraction]] | None:
     """The rows as t, states, inputs."""
     lines = rows(sheet, "a plan")
     header = next(lines, None)
@@ -121,28 +127,15 @@ def _rows(sheet: Sheet, columns: tuple[Column, ...] | None, names: Names) -> lis
             sheet.note(row)
         if len(sheet.findings) >= ENOUGH:
             return None
+    last = Cell(text="", line=len(sheet.source.lines) - 1, column=0)
     if len(values) < 2 and not sheet.findings:
-        last = header[0] if not values else _end(sheet)
-        sheet.fail(last, codes.PLAN_TIMES, f"a plan needs 2 rows or more below its header, not {len(values)}")
-    return None if sheet.findings else values
-
-
-def _knots(sheet: Sheet, values: list[list[Fraction]], n: int, interpolation: Interpolation) -> Knots | None:
-    if interpolation == "hermite-simpson" and len(values) % 2 == 0:
+        message = f"a plan needs 2 rows or more below its header, not {len(values)}"
+        sheet.fail(last if values else header[0], codes.PLAN_TIMES, message)
+    elif interpolation == "hermite-simpson" and len(values) % 2 == 0 and not sheet.findings:
         message = f"hermite-simpson needs an odd number of rows, not {len(values)}"
         help = "rows are in turn a knot and the point between it and the next knot"
-        sheet.fail(_end(sheet), codes.PLAN_TIMES, message, help)
-        return None
-    return Knots(
-        t=tuple(row[0] - values[0][0] for row in values),
-        x=tuple(tuple(row[1 : n + 1]) for row in values),
-        u=tuple(tuple(row[n + 1 :]) for row in values),
-        interpolation=interpolation,
-    )
-
-
-def _end(sheet: Sheet) -> Cell:
-    return Cell(text="", line=len(sheet.source.lines) - 1, column=0)
+        sheet.fail(last, codes.PLAN_TIMES, message, help)
+    return None if sheet.findings else values
 
 
 def _columns(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, others: bool) -> list[int] | None:
