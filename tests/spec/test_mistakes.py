@@ -9,6 +9,7 @@ import pytest
 from mistakes import GOOD, MISTAKES, ON_A_MACHINE
 
 from tubecert.errors import TubecertError
+from tubecert.expression import Lookup
 from tubecert.findings import Finding
 from tubecert.pipeline import inspect
 from tubecert.spec import instead, load_text
@@ -40,6 +41,16 @@ def test_a_mistake_is_located_and_what_to_write_is_said(mistake: tuple[str, str,
     places = [(item.code, item.location.line, item.location.column) for item in own]
     assert (code, line, column) in places, "\n".join(said)
     assert not any(JARGON.search(text) for text in said)
+
+
+@pytest.mark.parametrize("power", [2, 3])
+def test_the_table_that_is_told_for_drag_is_it_exactly(power: int) -> None:
+    text = GOOD.replace("c/m*v", "c/m*abs(v)*v", 1)
+    rows = re.findall(r"\[(-?\d+), (-?\d+), (-?\d+)\]", next(item.help for item in found(text)))
+    x, y, slopes = zip(*(map(Fraction, row) for row in (rows[:3] if power == 2 else rows[3:])), strict=True)
+    drag = Lookup("drag", x, y, slopes)
+    for v in (Fraction(k, 7) for k in range(-62, 63)):
+        assert drag.at(v) == (v * abs(v) if power == 2 else abs(v) ** 3)
 
 
 def test_there_are_many_of_them() -> None:

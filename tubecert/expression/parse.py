@@ -232,8 +232,9 @@ class _Lowering:
 
     def _exponent(self, node: ast.BinOp) -> int:
         value, words = self.values[node.right], self._source(node.right)[:40]
-        if value.is_constant and value.fraction == Fraction(1, 2):
-            raise self._error(node.right, "the exponent must be an integer", help="write sqrt(...)")
+        if value.is_constant and value.fraction.denominator == 2:
+            help = "write sqrt(...): x**1.5 is x*sqrt(x), x**-0.5 is 1/sqrt(x)"
+            raise self._error(node.right, f"the exponent {words} is not an integer", help=help)
         if not value.is_constant or value.fraction.denominator != 1:
             raise self._error(
                 node.right,

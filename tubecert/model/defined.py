@@ -65,6 +65,8 @@ def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort)
                 f"{to_text(duty.argument)} {_wrong(duty, decision.at)} {place(decision.at)}"
             )
             remedy = "shrink the safe set, or rewrite the expression so that it is smooth there"
+            if duty.kind == "nonzero":
+                remedy += "; a quotient that has a limit there, as sin(x)/x, is followed closely by a table"
         if duty.table:
             at = f", at {place(decision.at)}" if decision.verdict is Verdict.REFUTED else ""
             message = f"'{duty.text}' may leave its table, which goes {duty.table}, on {where}{at}"
