@@ -95,7 +95,6 @@ def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **chang
         "unresolved": np.full(N, np.nan),
         "failures": (),
         "steps": np.ones(N),
-        "level": np.zeros(N),
     }
     return Runs(**(values | changes))
 

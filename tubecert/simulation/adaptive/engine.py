@@ -63,7 +63,6 @@ class _Lanes:
         self.unresolved = np.full(self.N, np.nan)
         self.changes = np.full((_LEVELS, self.N), np.inf)
         self.failed = np.zeros((_LEVELS, self.N), dtype=bool)
-        self.level = np.zeros(self.N, dtype=np.int64)
         self.steps = np.zeros(self.N, dtype=np.int64)
         gains = [batch.problem.gains for batch in batches]
         radius = [np.inf if own is None else own.projection_radius for own in gains]
@@ -90,7 +89,7 @@ class _Lanes:
         for place in np.flatnonzero(finer.stopped):
             self.reasons[int(lanes[place])] = system.reason(int(place), int(finer.stopped[place]))
         self.found = finer if self.found is None else _merged(self.found, finer, lanes)
-        self.level[lanes], self.steps[lanes] = level, len(grid.start) - 1
+        self.steps[lanes] = len(grid.start) - 1
         self.failed[level, lanes] = finer.stopped != 0
         return grid
 
@@ -161,7 +160,6 @@ class _Lanes:
                 for lane in stopped.tolist()
             ),
             steps=self.steps[lanes],
-            level=self.level[lanes],
             **{name: seen[name] for name in _SEEN},
         )
 

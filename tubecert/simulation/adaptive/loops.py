@@ -19,7 +19,7 @@ Controller = Literal["nominal", "ccm", "reference", "l1"]
 
 
 class Terms(NamedTuple):
-    """The terms of a loop, in the form that compiled lanes read."""
+    """Which terms a loop has."""
 
     filters: bool = False
     knows: bool = False

@@ -124,7 +124,7 @@ def nothing_beside(N: int, k: int = 0) -> Beside:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Disturbance:
-    """h(t, x) of N lanes, evaluated inside the compiled loop; every array has the lanes first.
+    """h(t, x) of N lanes; every array has the lanes first.
 
     h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'(x - centre) + phase_k) + push c),
     where clip is the projection to the ball of `radius` (inf: none), and c = B'M gamma_s /
@@ -162,13 +162,6 @@ class Disturbance:
     def lanes(self) -> int:
         """N."""
         return len(self.push)
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether h vanishes for every lane."""
-        parts = (self.amplitude, self.push, self.beside.wind)
-        known = not self.beside.theta.size
-        return known and self.base is None and not any(np.any(part) for part in parts)
 
     def of(self, lanes: NDArray[np.intp]) -> Disturbance:
         """The disturbance of some lanes, given by their numbers."""

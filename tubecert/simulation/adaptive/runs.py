@@ -75,7 +75,6 @@ class Runs:
     unresolved: Array
     failures: tuple[Failure, ...]
     steps: NDArray[np.int64]  # (N,), how many steps the run took
-    level: NDArray[np.int64]  # (N,), how often its steps were halved
 
     @property
     def u(self) -> Array:
@@ -119,6 +118,5 @@ def joined(parts: list[Runs]) -> Runs:
         worst=Worst(**peaks),
         failures=failures,
         steps=np.concatenate([part.steps for part in parts]),
-        level=np.concatenate([part.level for part in parts]),
         **{name: stacked(name) for name in lanewise},
     )
