@@ -11,41 +11,39 @@ PACKAGE = Path(tubecert.__file__).parent
 TESTS = Path(__file__).parents[1]
 OWN = "."  # the modules beside the rooms
 BUDGET = {  # room: lines, modules, classes
-    ".": (1981, 18, 31),
+    ".": (1989, 18, 31),
     "bounds": (2374, 15, 21),
-    "campaigns": (241, 4, 0),
-    "certificate": (1501, 10, 45),
+    "certificate": (1505, 10, 45),
     "checking": (490, 5, 5),
     "claims": (829, 12, 75),
-    "cli": (3703, 34, 23),
+    "cli": (3687, 34, 23),
     "conditions": (1688, 16, 22),
-    "controller": (422, 5, 3),
+    "controller": (419, 5, 3),
     "enclosure": (2941, 18, 41),
-    "expression": (2562, 15, 16),
+    "expression": (2565, 15, 16),
     "kinds": (683, 7, 19),
-    "library": (3280, 22, 30),
-    "lint": (1094, 8, 3),
-    "loop_design": (1318, 10, 9),
+    "library": (3244, 22, 30),
+    "lint": (1157, 8, 3),
+    "loop_design": (1169, 9, 7),
     "metric": (527, 3, 4),
-    "model": (556, 5, 1),
-    "pipeline": (2320, 16, 13),
+    "model": (558, 5, 1),
+    "pipeline": (2346, 16, 13),
     "planner": (708, 5, 10),
-    "recheck": (13506, 91, 143),
-    "report": (6302, 48, 44),
-    "sampled_loop": (2163, 11, 34),
+    "recheck": (13156, 87, 138),
+    "report": (6160, 46, 44),
+    "sampled_loop": (1889, 9, 32),
     "search": (961, 8, 6),
-    "simulate": (5987, 36, 92),
-    "simulation": (1105, 8, 14),
-    "spec": (5677, 30, 42),
+    "simulation": (5280, 34, 77),
+    "spec": (5817, 30, 52),
     "stages": (1309, 10, 13),
-    "sweep": (519, 5, 8),
+    "sweep": (517, 5, 8),
     "synthesis": (4017, 28, 37),
     "trajectory": (949, 7, 8),
     "tube": (647, 4, 6),
-    "words": (993, 7, 0),
+    "words": (1011, 7, 0),
 }  # fmt: skip
-FUNCTIONS = 4950  # of the package
-TEST_LINES = 43_500
+FUNCTIONS = 4750  # of the package
+TEST_LINES = 44_200
 
 
 def counted() -> dict[str, tuple[int, int, int]]:

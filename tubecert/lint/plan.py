@@ -256,7 +256,7 @@ def _equilibrium(spec: Spec, curve: _Curve, model: ControlAffineModel) -> str:
             if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(missed))):
                 break
             if np.all(np.abs(missed) <= _LEFT * np.abs(slopes).max()):
-                found = [f"{value + 0.0:.12g}" for value in np.round(z[:-1] / size, 12) * size]
+                found = [near(value + 0.0, 12) for value in np.round(z[:-1] / size, 12) * size]
                 held = f"input: [{', '.join(found[n:])}]"
                 inside = np.all((low <= z[:n]) & (z[:n] <= high))
                 return (held if first else f"at: [{', '.join(found[:n])}], {held}") if inside else ""
