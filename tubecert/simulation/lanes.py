@@ -59,6 +59,11 @@ class Found(NamedTuple):
     ended: Array
 
 
+def ends(count: int, first: int, size: int) -> list[int]:
+    """Where vectors of `count` runs begin and end, 0 first: one of `first` runs, then of `size` each."""
+    return [0, *range(first, count, size), count]
+
+
 def follow(system: System, start: Array, length: Array, outputs: NDArray[np.int64]) -> Found:
     """All steps from `start` on, (S + 1,) in s, the last of length 0; `outputs` (K,) begin at the output times."""
     record, x, last = _Record(system, start, outputs), system.start(), len(start) - 1

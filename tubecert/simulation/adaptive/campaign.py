@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice, takewhile
+from itertools import islice, pairwise, takewhile
 from typing import Final
 
 import numpy as np
@@ -25,9 +25,11 @@ from tubecert.simulation.adaptive.record import FollowedData, LoopData, MembersD
 from tubecert.simulation.adaptive.runs import Runs, joined
 from tubecert.simulation.adaptive.setting import Loop, Setting
 from tubecert.simulation.adaptive.uncertainty import usual
+from tubecert.simulation.lanes import ends
 from tubecert.trajectory import Plan
 
 LANES: Final = 128  # random runs of a vector: they are kept, and told of, when all of them are finished
+_FIRST: Final = 8  # of the first vector: who interrupts soon has these, and the loops that are drawn
 PLANS: Final = 25  # random plans whose runs are one vector
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
@@ -99,7 +101,7 @@ def simulate(
     own = _specified(setting) if replay is None else cases(setting, seed, [replay])
     tested = [loop for loop in loops if loop.tested] if count else []
     numbers = range(count if tested else 0)
-    vectors = [numbers[first : first + LANES] for first in range(0, max(1, len(numbers)), LANES)]
+    vectors = [numbers[a:b] for a, b in pairwise(ends(len(numbers), min(_FIRST, LANES), LANES))]
     found = _found(partial(_vector, setting, loops, own, seed), vectors, report, executor)
     parts, complete = [runs[len(runs) - len(tested) :] for runs in found], len(found) == len(vectors)
     drawn = [

@@ -8,6 +8,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from math import ceil
 from typing import Final, Literal, NamedTuple
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.progress import Phase, Progress, Step
+from tubecert.simulation.lanes import ends
 from tubecert.simulation.sampled.attack import Attack, Flags, Lanes
 from tubecert.simulation.sampled.families import course_of, courses
 from tubecert.simulation.sampled.loop import SINGLE, Controllers, Seen, linear, run
@@ -22,6 +24,7 @@ from tubecert.simulation.sampled.setting import Setting
 from tubecert.verdict import Verdict
 
 FORMAT: Final = "tubecert-sampled-simulation/1"
+_FIRST: Final = 64  # of the first chunk: who interrupts soon has these
 LANES: Final = 1024  # of a chunk: the more, the cheaper is each
 _PLANS: Final = 256  # of a chunk whose lanes have plans of their own, which are kept
 _RESOLVED: Final = 0.01  # of a half-width, that a run may be wrong by
@@ -43,10 +46,10 @@ def simulate(
     attack, found = Attack(setting=setting, seed=seed), list[Seen]()
     asked, size = len(attack.aims) + runs, LANES if setting.spec.trajectory.bundle is None else _PLANS
     with suppress(KeyboardInterrupt):
-        for first in range(0, asked, size):
+        for first, last in pairwise(ends(asked, min(_FIRST, size), size)):
             if report is not None:
                 report(Step(phase=Phase.SIMULATION, done=first, of=asked))
-            found.append(chunk(attack, attack.lanes(first, min(first + size, asked)), controllers))
+            found.append(chunk(attack, attack.lanes(first, last), controllers))
     code: Literal["c", "floats"] = "c" if controllers else "floats"
     return Campaign(attack=attack, certificate=certificate, asked=asked, controller=code, found=tuple(found))
 
