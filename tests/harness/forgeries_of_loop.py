@@ -118,7 +118,7 @@ def harder(draw, result, every):
 
 
 KINDS = {
-    "numbers": (field(r"(?!spec|planned|controller)"), 4), "question": (field(r"planned|spec\.effective"), 7),
+    "numbers": (field(r"(?!spec|planned|controller)"), 4), "question": (field(r"planned|spec\.effective\."), 7),
     "entries": (field(r"controller\.\w\.rows"), 4), "narrower": (field(r"tube|inputs", (0.999, 0.98, 0.9)), 4),
     "tables": (tables, 3), "stages": (stages, 2), "sections": (sections, 2), "structure": (None, 4),
     "harder": (harder, 5),
@@ -153,7 +153,7 @@ def forged(draw, document, kind, every):
 def why_true(document, before):
     """The rule by which a confirmed forgery is true; UNEXPLAINED without one."""
     said = document["result"]
-    if all(own == before.get(key) for key, own in said.items() if key not in ("recipe", "nominal")):
+    if {**said, "recipe": 0, "nominal": 0} == {**before, "recipe": 0, "nominal": 0}:
         return "steers the check"
     wider = json.loads(json.dumps(said["tube"]), parse_float=lambda text: 1.005 * float(text))
     tubes = ({**document, "result": {**said, "tube": tube}} for tube in (said["tube"], wider))
