@@ -38,7 +38,9 @@ SIDES = {
         ("tests/recheck/sampled_loop",),
     ),
 }
-FEW_SECONDS = 150
+FEW_SECONDS = 150  # of the processor
+DEAR = 2  # certificates, the last ones
+SHOWN = ("test_a_lie_is_not_confirmed", "test_the_proof_of_an_easier_question_is_none_of_a_harder_one")
 SWAPPED = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Lt: ast.LtE, ast.LtE: ast.Lt,
     ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.And: ast.Or, ast.Or: ast.And,
@@ -167,25 +169,45 @@ def says(side, document):
 
 
 def killer(side, package, tests, good, bad):
-    """What notices; "" if nothing does. In a process of its own."""
+    """What notices; "" if nothing does."""
     for name in [
         own
         for own in sys.modules
-        if own.startswith(
-            (package, "tubecert.loop_design", "tubecert.recheck.run", "sampled_files", "test_sampled")
-        )
+        if own.startswith((package, "tubecert.loop_design", "tubecert.recheck.run", "sampled_files", "test_"))
     ]:
         del sys.modules[name]
-    for own in good:
-        if not holds(side, own):
-            return "good"
-    for own in bad:
-        if holds(side, own):
-            return "forged"
     with open(os.devnull, "w") as nothing:
         os.dup2(nothing.fileno(), 1)
-        failed = pytest.main([*tests, "-x", "-q", "-n", "0", "-p", "no:cacheprovider"])
-    return "tests" if failed else ""
+    steps = (  # what is cheap and notices much comes first
+        ("good", lambda: not all(holds(side, own) for own in good[:-DEAR])),
+        ("tests", lambda: failing(tests, "not slow")),
+        ("good", lambda: not all(holds(side, own) for own in good[-DEAR:])),
+        ("forged", lambda: any(holds(side, own) for own in bad)),
+        ("tests", lambda: failing(tests, "slow")),
+    )
+    return next((name for name, notices in steps if notices()), "")
+
+
+def failing(tests, which):
+    """Whether one of the tests fails; but for those of the forged certificates, which are shown before."""
+    how = ["-x", "-q", "-n", "0", "-p", "no:cacheprovider", "-m", which, "-k", f"not ({' or '.join(SHOWN)})"]
+    return pytest.main([*tests, *how]) not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+
+
+def noticed(side, finders, good, bad):
+    """What `killer` says in a process of its own, with what it imports by these; "time" if that does not end."""
+    package, _, tests = SIDES[side]
+    ended, told = os.pipe()
+    if not (child := os.fork()):
+        signal.setitimer(signal.ITIMER_PROF, FEW_SECONDS)
+        sys.meta_path[:0] = finders
+        os.write(told, killer(side, package, tests, good, bad).encode() or b"-")
+        os._exit(0)
+    os.close(told)
+    by = os.read(ended, 99).decode() or "time"
+    os.close(ended)
+    os.waitpid(child, 0)
+    return by
 
 
 def main():
@@ -198,28 +220,21 @@ def main():
     parser.add_argument("--seed", type=int, default=34)
     parser.add_argument("--only", type=int, nargs="*", help="which of them, by number")
     given = parser.parse_args()
-    package, modules, tests = SIDES[given.side]
+    package, modules, _ = SIDES[given.side]
     good, bad = documents()
     assert all(says(given.side, own) for own in good)
     bad = [own for own in bad if not holds(given.side, own)]
+    failing(SIDES[given.side][-1], "slow and not slow")  # imports what the tests do
+    assert noticed(given.side, [], good, bad) == "-"
     killed = 0
     for number, (name, place, which) in enumerate(drawn(package, modules, given.count, given.seed)):
-        if given.only and number not in given.only:
+        if given.only is not None and number not in given.only:
             continue
         tree = ast.parse((ROOT / package.replace(".", "/") / f"{name}.py").read_text())
         node = places(tree)[place]
         before, (kind, change) = ast.unparse(node), list(mutations(node))[which]
         tree = ast.fix_missing_locations(Changed(node, change).visit(tree))
-        ended, told = os.pipe()
-        if not (child := os.fork()):
-            signal.alarm(FEW_SECONDS)  # what does not end is noticed
-            sys.meta_path.insert(0, Finder(f"{package}.{name}", tree))
-            os.write(told, killer(given.side, package, tests, good, bad).encode() or b"-")
-            os._exit(0)
-        os.close(told)
-        by = os.read(ended, 99).decode() or "time"
-        os.close(ended)
-        os.waitpid(child, 0)
+        by = noticed(given.side, [Finder(f"{package}.{name}", tree)], good, bad)
         killed += by != "-"
         print(f"{number} {by} {name}:{node.lineno} {kind} {before}", flush=True)
     print(f"{killed} killed")
