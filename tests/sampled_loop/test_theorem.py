@@ -171,6 +171,13 @@ def test_start():
         close(found.U, [size / TS, 1e-30], 1e-6)
 
 
+def test_a_memory_is_bounded_from_the_first_sample_on():
+    """zeta_(k+1) = e_k, and e is forgotten within a sample; zeta_0 = 0."""
+    tables = controller_of([[-1 / TS]], [[0]], [[1]], [[0]])
+    found = bounds(loop_of(initial_state="{at: [0.02]}"), W=0.03, tables=tables, starts=(0, 1, 2))
+    close(found.Z, [0, 0.02, 1e-30], 1e-6)
+
+
 def test_a_start_has_signs_a_box_has_none_and_a_ball_its_length():
     """delta = 3 x + 4 v."""
     for start, size in (("{at: [4, -3]}", 0), ("{box: {x: [-1, 1], v: [-1, 1]}}", 7), ("{within: 1}", 5)):
@@ -226,11 +233,19 @@ RANGE = ", parameters: {p: [0.9, 1.1]}"
         ({"uncertainty": "{h: ['0.2*x']}", "system": scalar("0", "1 + 0.1*x")}, 0.5, 0, [3], (0.15, 0.1)),
         ({"uncertainty": "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"}, 0.5, 0, [3], (0, 0.1)),
         ({"uncertainty": "{bounds: {h: 3}}", "system": scalar("0", "1 + 0.1*x")}, 0.5, 0, (), (0.15, 0)),
+        (
+            {"trajectory": WAVE, "uncertainty": "{bounds: {h: 3}}", "system": scalar("0", "1 + 0.1*x")},
+            0.5, 0, (), (0.45 + 0.05 + 0.1 * (0.5 * (1 + TS / 2) + 0.625 * 0.5 * TS / 2), TS / 2),
+        ),
         ({"disturbance": "{E: [['1 + 0.2*x']], bound: 0.3}"}, 0.5, 0, (), (0.03, 0)),
         ({"disturbance": "{E: [['1 + 0.2*x']], bound: 0.3, rate: 1}"}, 0.5, 0, [0.3], (0.03, 0)),
         ({"trajectory": WAVE, "disturbance": "{E: [['1 + 0.2*x']], bound: 0.3}"}, 0.5, 0, (), (0.09, TS / 2)),
         ({"disturbance": "{E: [['1 + 0.6*x', '1 + 0.8*x']], bound: 0.3}", "E": [[1, 1]]}, 0.5, 0, (), (0.15, 0)),
         ({"trajectory": "{kind: equilibrium, at: [0], input: [0.02]}"}, 0.5, 0, (), (0.02, 2**-24 * 0.02)),
+        (
+            {"trajectory": "{kind: expressions, x: ['0.1*t'], u: ['0.1'], horizon: 2, afterwards: rest}"},
+            0.5, 0, (), (0.1, 2**-24 * 0.1),
+        ),
         ({"trajectory": WAVE.replace("cos(t)'", "cos(t) + 0.02'")}, 0.5, 0, (), (0.02, TS / 2)),
         ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": [[-1]]}, 0.5, 0, (), (0.1 + 0.05, 2**-24)),
         ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": [[-1]], "slow": True}, 0.5, 0, [0.1], (0.05, 2**-24)),
@@ -249,7 +264,7 @@ def test_what_is_left(sections, W, U, size, through):
 def test_what_is_left_acts_as_a_wind_does_through_its_columns():
     """x' = v, v' = u: of a defect of v nothing but half of Ts^2 comes to x within a sample."""
     loop = loop_of(**DOUBLE, A=[[0, 1], [0, 0]], B=[[0], [3]])
-    direct = Responses(loop, controller_of([[0, 0]]), lags=2, pieces=1, panels=64).direct[-1]
+    direct = Responses(loop, controller_of([[0, 0]]), lags=1, pieces=1, panels=16).direct[-1]
     close(direct.rho, [[TS, TS**2 / 2, 3 * TS**2 / 2], [0, TS, 3 * TS]])
 
 
@@ -457,6 +472,13 @@ def test_what_was_sent_in_a_stage_is_met_in_the_next():
     ]  # fmt: skip
 
 
+def test_a_command_acts_in_its_own_stage():
+    """Without delay: the first of a stage with larger ones acts at once."""
+    W, U = np.array([[1.0], [1.0]]), np.array([[0.4], [1.0]])
+    phases, _ = asked(loop_of(), starts=(0, 4)).phases(Boxes(W, U, np.zeros((2, 0))))
+    assert [(own.start, own.core[1]) for own in phases] == [(0, 0.4), (4, 1), (5, 1)]
+
+
 @pytest.mark.parametrize(
     ("sections", "size", "rate", "first"),
     [
@@ -496,3 +518,54 @@ def test_rows_up_to_the_last_that_differs():
     assert asked(late, starts=(0, 9), lags=7).last == 9 + 2 + 1 + 7
     ends = loop_of(trajectory=WAVE.replace("repeat", "nothing").replace("horizon: 7", "horizon: 1.01"))
     assert (ends.samples, asked(ends, lags=50).last) == (11, 10)
+
+
+def test_matrices_are_proposed_in_the_middle_of_the_slopes_along_the_plan():
+    """F = x^2 + (1 + x/10) u, where 1 <= x* <= 3 and |u*| <= 1, and E = x/2."""
+    loop = loop_of(
+        system=scalar("x**2", "1 + 0.1*x"),
+        trajectory="{kind: any, x: {x: [1, 3]}, u: {u: [-1, 1]}, defect: 0.1}",
+        initial_state="{within: 0.1}",
+        disturbance="{E: [['0.5*x']], bound: 1}",
+    )
+    for found, exact in zip(Remainders(loop, 4).middle(), (4, 1.2, 1), strict=True):
+        assert np.abs(found - exact).max() < 1e-9
+
+
+@pytest.mark.parametrize(("limits", "room"), [("[-1.5, 3]", 0.5), ("[-3, 1.25]", 0.25)])
+def test_an_input_may_go_as_far_as_the_nearer_limit(limits, room):
+    found = Remainders(loop_of(trajectory=WAVE, limits=f"{{u: {limits}}}"), 256).room
+    assert found <= room
+    assert found > room - 0.01
+    assert Remainders(loop_of(trajectory=WAVE), 8).room == np.inf
+
+
+def judged(loop, tables, *stages, cut=0):
+    """The judgement on stages (start, W, U); one cut for all."""
+    own = [
+        Stage(
+            start=start,
+            half_widths=dict(zip(loop.model.states, map(Fraction, W), strict=True)),
+            deviations=dict.fromkeys(loop.model.inputs, Fraction(U)),
+            memory=(),
+        )
+        for start, W, U in stages
+    ]
+    recipe = replace(
+        asked(loop, tables).recipe, cuts=((cut,) * loop.H.shape[1],) * (loop.states + loop.inputs)
+    )
+    return check(loop, tables, own, recipe)
+
+
+def test_the_state_that_is_too_wide_is_named_and_inputs_are_those_of_the_widest_stage():
+    loop = loop_of(**{**DOUBLE, "initial_state": "{at: [0, 0.5]}"}, A=[[0, 1], [0, 0]], B=[[0], [1]])
+    own = controller_of([[-3, -4]])
+    found = judged(loop, own, (0, (1, 0.4), 3), (2, (1, 0.4), 4))
+    assert [(lack.kind, lack.where) for lack in found.lacks] == [("no_fixed_point", "v")]
+    assert [float(end) for end in found.inputs[0].range] == pytest.approx([-4, 4])
+
+
+def test_cuts_are_lags():
+    loop = loop_of(uncertainty="{h: ['0.1*sin(t)']}")
+    for cut, verdict in ((-1, "undecided"), (0, "certified"), (6, "undecided")):
+        assert judged(loop, controller_of(), (0, [1], 9), cut=cut).verdict.value == verdict
