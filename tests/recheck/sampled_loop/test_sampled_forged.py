@@ -87,6 +87,7 @@ LIES = {
     "an input out of its range": (SCALAR, ("inputs", 0, "range"), ["-0.9", "0.9"]),
     "an input above its range": (SCALAR, ("inputs", 0, "range"), ["-3", "0.9"]),
     "an input below its range": (SCALAR, ("inputs", 0, "range"), ["-0.9", "3"]),
+    "an input that leaves its range on its way": (SWING, ("inputs", 0, "range"), ["-1.2", "1.2"]),
     "an input out of its limits": (SCALAR, spec("limits", "u"), ["-0.9", "3"]),
     "an input left out": (SCALAR, ("inputs",), []),
     "an obstacle in the way": (CART, spec("obstacles", 0, "disc", "center"), ["0.5", "0.5"]),

@@ -1,17 +1,20 @@
 """What the checker says is left of a plant that is not linear, against closed forms: never below, and near."""
 
 import json
+from fractions import Fraction
+from math import ceil
 
 import pytest
 from flint import arb, arb_mat
 from sampled_files import CART, SCALAR, changed, made, why_not
 
 from tubecert.recheck.document import Node, read
-from tubecert.recheck.plans import Plan
+from tubecert.recheck.metric import CONFIRMED
+from tubecert.recheck.plans import Knots, Plan
 from tubecert.recheck.sampled_loop.claims import Case
 from tubecert.recheck.sampled_loop.loop import Loop
-from tubecert.recheck.sampled_loop.record import read_certificate
-from tubecert.recheck.sampled_loop.remainders import Remainders
+from tubecert.recheck.sampled_loop.record import Proven, Recipe, Stage, read_certificate
+from tubecert.recheck.sampled_loop.remainders import Remainders, Size
 from tubecert.recheck.sampled_loop.windows import course_of
 from tubecert.recheck.specification import read_sampled_specification
 from tubecert.spec import load_text
@@ -32,17 +35,55 @@ def scalar(f="0", B="1", more=""):
     return f"{{states: [x], inputs: [u], f: ['{f}'], B: [['{B}']]{more}}}"
 
 
-def left(*, A=0, E=(), slow=False, **sections) -> Remainders:
-    """Of x' = f + B u with some sections in place of those at home."""
+def asked(**sections):
+    """The specification with some sections in place of those at home."""
     text = "tubecert: 1\nname: a\n" + "\n".join(f"{k}: {v}" for k, v in {**HOME, **sections}.items())
-    given = read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
-    course = course_of(given, Plan(given.trajectory.kind, None, None, None, None, None))
+    return read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
+
+
+def planned(given, knots=None) -> Plan:
+    """Its plan, through knots if there are some."""
+    return Plan(given.trajectory.kind, knots and given.trajectory.between, None, knots, None, None)
+
+
+def left(*, A=0, E=(), slow=False, knots=None, **sections) -> Remainders:
+    """Of x' = f + B u with some sections in place of those at home."""
+    given = asked(**sections)
     nominal = arb_mat([[A]]), arb_mat([[1]]), arb_mat(1, len(E), list(E))
-    return Remainders(course, nominal, 256, slow=slow)
+    return Remainders(course_of(given, planned(given, knots)), nominal, 256, slow=slow)
+
+
+def case_of(stages, tables, *, lags=4, ranges=(), **sections) -> Case:
+    """A case of n = 1 with stages (start, W, U, Z ..) and tables F, G, M, N, that nobody has proven."""
+    given = asked(**sections)
+    n, m, z = len(given.plant.states), len(given.plant.inputs), tables[0].nrows()
+    own = tuple(
+        Stage(k, (Fraction(W),) * n, (Fraction(U),) * m, (*map(Fraction, Z),)) for k, W, U, *Z in stages
+    )
+    return Case(
+        given,
+        Proven(
+            nominal=(arb_mat(n, n), arb_mat(n, m, [1] * (n * m)), arb_mat(n, 0)),
+            tables=dict(zip("FGMN", tables, strict=True)),
+            stages=own,
+            recipe=Recipe(lags, ((),) * (n + m + z), 1, 1, 8, slow=True),
+            plan=planned(given),
+            ranges=ranges,
+            cleared=(),
+            repeated={},
+        ),
+        2000,
+    )
+
+
+SILENT = arb_mat(0, 0), arb_mat(0, 1), arb_mat(1, 0), arb_mat([[0]])
 
 
 RANGE = ", parameters: {p: [0.9, 1.1]}"
 BENT = scalar("0", "1 + 0.1*x")
+RESTING = "{kind: equilibrium, at: [0], input: [0], horizon: 4}"
+THROUGH = "{kind: ilqr, start: [0], target: [2], horizon: 2, knots: 3, goal: false}"
+KNOTS = Knots(*(tuple(map(Fraction, (0, 1, 2))), *(((Fraction(0),), (Fraction(1),), (Fraction(2),)),) * 2))
 KNOWN = "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"
 
 
@@ -79,6 +120,9 @@ def test_what_is_left(sections, U, through):
     [
         ({"uncertainty": "{h: ['0.3*sin(2*t) + 0.2*x']}", "trajectory": WAVE}, 0.6, 0.8, 0),
         ({"uncertainty": "{h: ['0.3*cos(2*t)']}", "trajectory": WAVE}, 0.3, 0.6, 0.3),
+        ({"uncertainty": "{h: ['0.3*sin(0.5*t)']}", "trajectory": WAVE}, 0.3, 0.15, 0),
+        ({"uncertainty": "{h: ['0.1*t']}", "trajectory": RESTING}, 0.4, 0.1, 0),
+        ({"uncertainty": "{h: ['0.1*t']}", "trajectory": THROUGH, "knots": KNOTS}, 0.2, 0.1, 0),
         ({"uncertainty": KNOWN, "trajectory": WAVE}, 3, 1.2, 3),
         ({"disturbance": "{E: [[1]], bound: 0.3, rate: 2}", "E": [1]}, 0.3, 2, 0.3),
         ({"trajectory": WAVE, "system": scalar("(p - 1)*x**2", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
@@ -100,6 +144,7 @@ def test_rows_change_as_their_derivatives_say(delay):
         Node(json.loads(json.dumps(canonical(load_text(text)))), "spec")
     ).hardware
     loop = Loop(A, B, H, *tables, machine.sample_time, machine.delay)
+    assert loop.waiting == ceil(float(delay) / 0.1)
     for s, later in ((arb("0.05"), True), (arb("0.02"), not loop.rest)):
         h = arb("1e-6")
         moved = (loop.error(s + h, later=later) - loop.error(s - h, later=later)) * (1 / (2 * h))
@@ -127,3 +172,95 @@ def test_h_is_as_large_as_on_the_widest_stage():
     (own,) = Case(found.specification, found.proven, 2000).slow
     assert max(widths) > 2 * min(widths)
     assert 0.1 * max(widths) <= float(own.size.abs_upper()) <= 0.101 * max(widths)
+
+
+@pytest.mark.parametrize("at", [0.3, 3.1, 6.8])
+def test_a_plan_misses_what_it_misses_most(at):
+    """x* = 0 and u* = .02 at one time, and next to nothing elsewhere."""
+    trajectory = f"{{kind: expressions, x: ['0'], u: ['0.02/(1 + 100*(t - {at})**2)'], horizon: 7}}"
+    given = asked(trajectory=trajectory)
+    (found,) = course_of(given, planned(given)).defect()
+    assert 0.02 * (1 - 1e-9) <= float(found.upper()) < 0.0202
+
+
+@pytest.mark.parametrize(("arithmetic", "unit"), [("single", 2**-24), ("double", 2**-53)])
+def test_rounding_of_a_controller(arithmetic, unit):
+    """x* = 1000 and u* = 5, |e| <= 2, |n| <= 3, |zeta| <= 9; c = z + n + 3 products and sums (theory, D.8)."""
+    tables = arb_mat([[0.5]]), arb_mat([[3]]), arb_mat([[7]]), arb_mat([[-10]])
+    case = case_of(
+        [(0, 2, 1, 9)],
+        tables,
+        trajectory="{kind: equilibrium, at: [1000], input: [5]}",
+        initial_state="{at: [1000]}",
+        safe_set="{x: [0, 2000]}",
+        hardware=f"{{sample_time: 0.1, arithmetic: {arithmetic}}}",
+    )
+    found = case._rounding(Size.of((Fraction(3),), 1), [arb(2)], [arb(9)])
+    y = 2**-24 * 1000 + 2 * unit * (2 * 1000 + 2 + 3)
+    exact = y, 5 * unit * (5 + 7 * 9 + 10 * (5 + y)), 5 * unit * (0.5 * 9 + 3 * (5 + y))
+    for ball, least in zip(found, exact, strict=True):
+        assert least * (1 - 1e-9) <= float(ball.abs_upper()) <= least * 1.00001
+
+
+@pytest.mark.parametrize(
+    ("sections", "starts", "lags", "last"),
+    [
+        ({"trajectory": WAVE.replace("7, afterwards: repeat", "1.01")}, (0,), 50, 10),
+        ({"trajectory": WAVE.replace("7, afterwards: repeat", "1")}, (0,), 50, 9),
+        ({"trajectory": WAVE.replace("7, afterwards: repeat", "1")}, (0,), 3, 4),
+        ({"hardware": "{sample_time: 0.1, delay: 0.25}"}, (0, 9), 7, 9 + 2 + 1 + 7),
+    ],
+)
+def test_samples_up_to_the_last_that_differs(sections, starts, lags, last):
+    case = case_of([(k, 1, 1) for k in starts], SILENT, lags=lags, **sections)
+    assert case.inequalities.last == last
+
+
+def test_the_stages_that_may_last_at_a_time_of_the_plan():
+    """They begin at 0, 1 and 2.5 s; the plan ends after 2 s."""
+    stages = [(0, "0.1", 1), (10, "0.2", 1), (25, "0.3", 1)]
+    for afterwards, spans in (
+        ("nothing", ((0, 0.9, 0.1), (0.5, 1, 0.2), (1.5, 2, 0.2))),
+        ("rest", ((0, 0.9, 0.1), (0.5, 1, 0.2), (1.5, 1.9, 0.2), (1.5, 2, 0.3), (1.5, 2 - 1e-12, 0.3))),
+        ("repeat", ((0, 0.9, 0.3),)),
+    ):
+        plan = f"{{kind: expressions, x: ['0.1*t'], u: ['0'], horizon: 2, afterwards: {afterwards}}}"
+        case = case_of(stages, SILENT, trajectory=plan)
+        for begin, end, widest in spans:
+            assert [*map(float, case._widths(begin, end))] == [widest], (afterwards, begin, end)
+    assert [*map(float, case_of(stages, SILENT)._widths(0.0, 0.5))] == [0.3]
+
+
+TWO = {
+    "system": "{states: [x, y], inputs: [u, v], f: ['0', '0'], B: [[1, 0], [0, 1]]}",
+    "safe_set": "{x: [-50, 50], y: [-50, 50]}",
+    "trajectory": "{kind: equilibrium, at: [0, 0], input: [0, 0]}",
+    "initial_state": "{at: [0, 0]}",
+}
+
+
+def test_a_plan_of_two_inputs_rests():
+    trajectory = "{kind: expressions, x: ['t', '0'], u: ['t', '1'], horizon: 1, afterwards: rest}"
+    given = asked(**{**TWO, "trajectory": trajectory})
+    last = course_of(given, planned(given)).windows(4)[-1]
+    assert [*map(float, last.u)] == [1, 1]
+    assert [*map(float, last.steepness)] == [0, 0]
+
+
+def test_every_input_is_within_its_limits():
+    for ranges, kept in (
+        (((-2, 2), (-2, 3)), True),
+        (((-2, 2), (-4, 2)), False),
+        (((-2, 4), (-2, 2)), False),
+    ):
+        own = tuple((Fraction(a), Fraction(b)) for a, b in ranges)
+        silent = arb_mat(0, 0), arb_mat(0, 2), arb_mat(2, 0), arb_mat(2, 2)
+        case = case_of([(0, 1, 1)], silent, ranges=own, limits="{u: [-3, 3], v: [-3, 3]}", **TWO)
+        assert (case.follows().verdict == CONFIRMED.verdict) is kept
+
+
+def test_no_controller_has_no_memory_and_adds_nothing():
+    for z, gain, kept in ((0, 0, True), (0, 0.5, False), (1, 0, False)):
+        tables = arb_mat(z, z), arb_mat(z, 2), arb_mat(2, z), arb_mat([[0, gain], [0, 0]])
+        case = case_of([(0, 1, 1, *[1] * z)], tables, controller="none", **TWO)
+        assert (case.single().verdict == CONFIRMED.verdict) is kept

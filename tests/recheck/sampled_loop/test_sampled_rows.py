@@ -17,6 +17,7 @@ from tubecert.recheck.curve import Knots as Curved
 from tubecert.recheck.document import Node
 from tubecert.recheck.obstacles import Obstacle
 from tubecert.recheck.plans import Plan
+from tubecert.recheck.sampled_loop import theorem
 from tubecert.recheck.sampled_loop.claims import _apart
 from tubecert.recheck.sampled_loop.loop import Loop, parted
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
@@ -192,6 +193,25 @@ def test_what_acts_within_a_sample_may_be_above_its_chord():
     assert 1.125 <= found.upper() < 1.3
 
 
+def test_every_panel_is_bent():
+    """x' = x + w: d^3/12 e^s is at most so much on either half of a sample."""
+    halved = plain([[1.0]], [1], [0.0], 1.0)
+    halved = replace(halved, recipe=replace(halved.recipe, panels=2))
+    bent, exact = float(halved._kernels(Fraction(1))[-1][0, 2].abs_upper()), (np.exp(0.5) + np.e) / 96
+    assert exact <= bent <= 1.2 * exact
+
+
+def test_no_more_is_kept_than_there_is_room_for(monkeypatch):
+    """Three rows, two lags, two phases."""
+    own = plain([[0.0]], [1], [0.5], 0.1)
+    own = replace(own, phases=[*own.phases, replace(own.phases[0], start=1)])
+    monkeypatch.setattr(theorem, "_MOST_TERMS", 12)
+    assert own.bounds(0, 0)
+    monkeypatch.setattr(theorem, "_MOST_TERMS", 11)
+    with pytest.raises(ArithmeticError, match="too many"):
+        replace(own).bounds(0, 0)
+
+
 def test_what_is_no_number_bounds_nothing():
     for wind in (float("nan"), float("inf")):
         (found,) = plain([[0.0]], [1], [0.5], wind).bounds(0, 1)
@@ -255,6 +275,10 @@ def test_inputs_that_jump_between_knots():
         assert Course(spec, None, knots).held([]) == [most]
     left = replace(spec, hardware=replace(spec.hardware, hold="left"))
     assert Course(left, None, knots).held([]) == [1]
+    once = replace(left, afterwards="nothing")
+    for times, rows, most in (((0, 1), (1, 2), 0), ((0, "0.3", "0.5001", 1), (0, 1, 3, 3), 3)):
+        knots = Knots(tuple(map(Fraction, times)), tuple((Fraction(x),) for x in rows))
+        assert Course(once, None, knots).held([]) == [most]
 
 
 def test_a_plan_through_knots_begins_again_where_it_ends():
