@@ -23,7 +23,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.acting import Acting
 from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, times
 from tubecert.simulation.adaptive.geodesics import FOUND, REASONS, Geodesic, Geodesics
-from tubecert.simulation.adaptive.problem import Batch, LoopProblem
+from tubecert.simulation.adaptive.problem import Batch, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.times import END, MIDDLE, START, Grid, Reference
 from tubecert.simulation.lanes import SHARES
 from tubecert.trajectory import Plan
@@ -74,23 +74,22 @@ class Continuous:
         self._roots, self._groups = np.ones(self._N), list[_Group]()
         for problem, size, end in zip(problems, sizes, np.cumsum(sizes).tolist(), strict=True):
             if problem.adaptive and problem.gains is not None:
-                self._add(problem, slice(end - size, end))
+                self._add(problem, problem.gains, slice(end - size, end))
         self.stopped = np.zeros(self._N, dtype=np.int64)
 
-    def _add(self, problem: LoopProblem, lanes: slice) -> None:
+    def _add(self, problem: LoopProblem, gains: LoopGains, lanes: slice) -> None:
         """Lanes of a loop that adapts: to the group before, if that has the same terms and gains."""
-        assert problem.gains is not None
         n, m = len(problem.model.states), len(problem.model.inputs)
         if self._groups:
             last = self._groups[-1]
-            if last.lanes.stop == lanes.start and (problem.terms, problem.gains) == (
+            if last.lanes.stop == lanes.start and (problem.terms, gains) == (
                 last.fast.terms,
                 last.fast.gains,
             ):
                 self._groups[-1] = last._replace(lanes=slice(last.lanes.start, lanes.stop))
                 self._roots[lanes] = last.fast.root
                 return
-        fast = Fast(problem.terms, problem.gains, self._P, m, m + n * self._blown)
+        fast = Fast(problem.terms, gains, self._P, m, m + n * self._blown)
         self._groups.append(_Group(lanes, fast, {}))
         self._roots[lanes] = fast.root
 

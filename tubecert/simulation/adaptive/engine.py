@@ -51,14 +51,18 @@ def integrate(batches: Sequence[Batch], *, tolerance: float, level: int | None =
 
 
 class _Lanes:
-    """Lanes on their way down the levels; arrays have the lanes last, as in `lanes.Found`."""
+    """Lanes on their way down the levels; arrays have the lanes last, as in `lanes.Found`.
+
+    `found` (once a level has run) is of every lane the last of its levels.
+    """
+
+    found: Found
 
     def __init__(self, batches: Sequence[Batch]) -> None:
         self.batches, self.problem = batches, batches[0].problem
         self.plans = list({id(batch.problem.plan): batch.problem.plan for batch in batches}.values())
         self.ends = np.cumsum([0, *(len(batch.x0) for batch in batches)])
         self.N = int(self.ends[-1])
-        self.found: Found | None = None
         self.error = np.full(self.N, np.inf)
         self.unresolved = np.full(self.N, np.nan)
         self.changes = np.full((_LEVELS, self.N), np.inf)
@@ -73,7 +77,7 @@ class _Lanes:
         """Level after level, of the lanes that are not done."""
         lanes = np.arange(self.N)
         for level in range(_LEVELS):
-            before = self.found
+            before = self.found if level else None
             grid = self.run(lanes, level)
             if before is not None:
                 lanes = lanes[~self._compare(lanes, before, grid, tolerance)]
@@ -88,7 +92,7 @@ class _Lanes:
         finer = follow(system, grid.start, grid.length, grid.outputs)
         for place in np.flatnonzero(finer.stopped):
             self.reasons[int(lanes[place])] = system.reason(int(place), int(finer.stopped[place]))
-        self.found = finer if self.found is None else _merged(self.found, finer, lanes)
+        self.found = finer if len(lanes) == self.N else _merged(self.found, finer, lanes)
         self.steps[lanes] = len(grid.start) - 1
         self.failed[level, lanes] = finer.stopped != 0
         return grid
@@ -101,7 +105,6 @@ class _Lanes:
         self, lanes: NDArray[np.intp], coarser: Found, grid: Grid, tolerance: float
     ) -> NDArray[np.bool_]:
         """Estimates the errors of the finer runs of lanes, and says which of them are done."""
-        assert self.found is not None
         own, level = self.found, grid.level
         apart = self._length(own.seen["x"][..., lanes] - coarser.seen["x"][..., lanes])
         change = np.nan_to_num(apart.max(axis=0), nan=np.inf)
@@ -142,7 +145,6 @@ class _Lanes:
 
     def _runs(self, plan: Plan, lanes: slice, grid: Grid) -> Runs:
         found, own = self.found, next(i for i, each in enumerate(self.plans) if each is plan)
-        assert found is not None
         times, stopped = found.peak_time, np.flatnonzero(found.stopped[lanes]) + lanes.start
         peaks = {name: Peak(value=peak[lanes], time=times[name][lanes]) for name, peak in found.peak.items()}
         seen = {name: np.moveaxis(part[..., lanes], -1, 0) for name, part in found.seen.items()}

@@ -52,7 +52,7 @@ def _states(campaign: Campaign) -> Figure:
             for sign, label in ((-1, None), (1, "in the long run")):
                 axis.plot(first.t, plan + sign * rest, color=TUBE, lw=1.0, ls=(0, (5, 2)), label=label)
         for item, curve in zip(campaign.drawn, curves, strict=True):
-            axis.plot(item.runs.t, curve, **_line(item.loop))
+            _draw(axis, item.loop, item.runs.t, curve)
         axis.plot(first.t, plan, color="black", lw=1.0, ls="--", label="plan")
         axis.set_ylim(*_window(np.array([plan.min() - width, plan.max() + width]), curves, 1.5))
         axis.set_ylabel(labelled(setting.spec, name))
@@ -72,7 +72,7 @@ def _plane(campaign: Campaign) -> Figure | None:
     shapes = [section + point for point in _spread(plan)]
     figure, axis = plane_of(setting.spec, names, shapes, plan)
     for item in campaign.drawn:
-        axis.plot(item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4, **_line(item.loop))
+        _draw(axis, item.loop, item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4)
     for end, marker in ((0, "o"), (-1, "s")):
         axis.plot(*plan[end], marker=marker, ms=4, color="black", ls="none", zorder=6)
     tube = np.vstack(shapes)
@@ -91,7 +91,7 @@ def _inputs(campaign: Campaign) -> Figure:
     axes = figure.subplots(len(setting.spec.inputs), 1, sharex=True, squeeze=False)[:, 0]
     for i, (axis, name) in enumerate(zip(axes, setting.spec.inputs, strict=True)):
         for item in campaign.drawn:
-            axis.plot(item.runs.t, item.runs.u[0, :, i], **_line(item.loop))
+            _draw(axis, item.loop, item.runs.t, item.runs.u[0, :, i])
             stays = item.loop.promise.ranges.get(name) if item.loop.promise else None
             for end, label in ((stays.least, "certified range"), (stays.greatest, None)) if stays else ():
                 axis.axhline(end, color=TUBE, lw=1.2, ls=":", label=label)
@@ -111,14 +111,14 @@ def _tube_use(campaign: Campaign) -> Figure:
     for item in campaign.drawn:
         share = item.runs.distance[0] / reach
         most = max(most, float(np.nanmax(share)))
-        axis.plot(item.runs.t, share, **_line(item.loop))
+        _draw(axis, item.loop, item.runs.t, share)
         if item.loop.promise is not None and item.loop.promise.decay is not None:
-            style = _line(item.loop, "certified D(t), ") | {"lw": 1.0, "ls": ":"}
-            axis.plot(item.runs.t, item.loop.promise.decay(item.runs.t) / reach, **style)
+            bound = item.loop.promise.decay(item.runs.t) / reach
+            _draw(axis, item.loop, item.runs.t, bound, "certified D(t), ", lw=1.0, ls=":")
     for attack in campaign.attacks:
         if attack.worst is not None:
-            style = _line(attack.loop, "worst adversary, ") | {"lw": 1.0, "alpha": 0.5}
-            axis.plot(attack.worst.t, attack.worst.distance[0] / reach, **style)
+            share = attack.worst.distance[0] / reach
+            _draw(axis, attack.loop, attack.worst.t, share, "worst adversary, ", lw=1.0, alpha=0.5)
     axis.axhspan(0, 1, color=TUBE, alpha=0.18, lw=0)
     axis.axhline(1, color=TUBE, lw=1.0)
     axis.set_ylim(0, min(1.06 * most, _FARTHEST))
@@ -169,10 +169,11 @@ DRAWERS: Final[Mapping[str, Callable[[Campaign], Figure | None]]] = {
 }
 
 
-def _line(loop: Loop, about: str = "") -> dict[str, Any]:
-    """How the curves of a loop are drawn: dashed for the one that nothing adapts and h acts on."""
-    style = (0, (6, 1.5)) if loop.controller == "ccm" else "-"
-    return {"color": COLORS[loop.controller], "ls": style, "label": about + _NAMES[loop.controller]}
+def _draw(axis: Axes, loop: Loop, x: Array, y: Array, about: str = "", **style: Any) -> None:
+    """A curve of a loop: dashed for the one that nothing adapts and h acts on."""
+    dashes = (0, (6, 1.5)) if loop.controller == "ccm" else "-"
+    usual = {"color": COLORS[loop.controller], "ls": dashes, "label": about + _NAMES[loop.controller]}
+    axis.plot(x, y, **(usual | style))
 
 
 def _title(campaign: Campaign) -> str:
