@@ -32,6 +32,7 @@ CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 GOOD = [
     *CONFIGS,
     *sorted((ROOT / "tests/specs/ok").glob("*.yaml")),
+    *sorted((ROOT / "tests/specs/planned").glob("*.yaml")),
     *sorted((PACKAGE / "templates").glob("*.yaml")),
 ]
 BAD = sorted((ROOT / "tests/specs/bad").glob("*.yaml"))
