@@ -1,5 +1,6 @@
 """Plans through knots: what their enclosures contain, how their defect is bounded, and what a plan file may say."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,6 +13,7 @@ from proven import proven
 from strategies import fractions
 from systems import SMALL, plain_model
 
+import tubecert
 from tubecert.certificate import seal
 from tubecert.checking.cache import key_of_system
 from tubecert.enclosure.branch_and_bound import Effort, supremum
@@ -486,6 +488,22 @@ def test_a_plan_from_a_file_is_certified_and_recorded(tmp_path):
     assert plan["knots"]["t"][:3] == ["0", "0.1", "0.2"]
     assert plan["knots"]["x"][7] == ["0.5", "0.5"]
     assert result["spec"]["effective"]["trajectory"]["horizon"] == "2"
+
+
+@pytest.mark.slow
+def test_a_certificate_does_not_take_a_file_for_another_plan(tmp_path, monkeypatch):
+    """It holds the knots, and not the scale of a column."""
+    monkeypatch.chdir(tmp_path)
+    for more, same in (("", True), (", columns: {p: {scale: 1/2}, q: {scale: 1/2}, u: {scale: 1/2}}", False)):
+        own = tubecert.certify(str(written(tmp_path, resting(21), more)), conditions="A")
+        own.save(tmp_path / "one.json")
+        found = tubecert.read(tmp_path / "one.json")
+        with (
+            nullcontext()
+            if same
+            else pytest.raises(SpecError, match="is another one than that of the certificate")
+        ):
+            assert found.specification.spec.trajectory.table
 
 
 @pytest.mark.slow

@@ -14,6 +14,8 @@ import numpy as np
 from tubecert.certificate import file
 from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
+from tubecert.errors import SpecError
+from tubecert.findings import Finding
 from tubecert.library.specification import File, Specification
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.spec import load_text
@@ -86,11 +88,16 @@ class Stated(Generic[C]):
         """What was certified.
 
         Of a certificate that was read it is taken from there; raises `TubecertError` if the plan is in a file (CSV)
-        that is not where it was.
+        that is not where it was, or does not hold the same knots as it stands (the certificate has no `columns`).
         """
         if self.given is not None:
             return self.given
-        return Specification(spec=load_text(file.dump(self.effective.data), "<certificate>"))
+        spec, own = load_text(file.dump(self.effective.data), "<certificate>"), self.certificate
+        knots = own.result.planned if isinstance(own, SampledCertificate) else own.result.plan.exact_knots()
+        if (table := spec.trajectory.table) is not None and table.knots != knots:
+            message = f"the plan in {table.file}, as it stands, is another one than that of the certificate"
+            raise SpecError([Finding(code="TC604", message=message, help="give the specification itself")])
+        return Specification(spec=spec)
 
     def save(self, path: File) -> None:
         """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`."""
