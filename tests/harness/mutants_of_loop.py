@@ -65,7 +65,9 @@ def mutations(node):
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         yield (
             "number",
-            lambda own: setattr(own, "value", own.value + 1 if type(own.value) is int else own.value / 2),
+            lambda own: setattr(
+                own, "value", own.value + 1 if type(own.value) is int else own.value / 2 or 1.0
+            ),
         )
     if isinstance(node, ast.Attribute) and node.attr in NAMES:
         yield "name", lambda own: setattr(own, "attr", NAMES[own.attr])

@@ -102,6 +102,11 @@ KNOWN = "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"
         ({"disturbance": "{E: [['1 + 0.6*x', '1 + 0.8*x']], bound: 0.3}", "E": [1, 1]}, 0, (0.15, 0)),
         ({"trajectory": WAVE, "disturbance": "{E: [['1 + 0.2*x']], bound: 0.3}", "E": [1]}, 0, (0.09, 0.05)),
         ({"trajectory": "{kind: equilibrium, at: [0], input: [0.02]}"}, 0, (0.02, 0)),
+        (
+            {"trajectory": "{kind: equilibrium, at: [0], input: [1000]}", "system": scalar("-1000")},
+            0,
+            (0, 1000 * 2**-24),
+        ),
         ({"trajectory": WAVE.replace("cos(t)'", "cos(t) + 0.02'")}, 0, (0.02, 0.05)),
         ({"trajectory": "{kind: expressions, x: ['0.1*t'], u: ['0.1'], horizon: 2, afterwards: rest}"}, 0, (0.1, 0)),
         ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": -1}, 0, (0.1 + 0.05, 0)),
