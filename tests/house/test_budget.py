@@ -22,7 +22,7 @@ BUDGET = {  # room: lines, modules, classes
     "enclosure": (2941, 18, 41),
     "expression": (2565, 15, 16),
     "kinds": (683, 7, 19),
-    "library": (3244, 22, 30),
+    "library": (3251, 22, 30),
     "lint": (1157, 8, 3),
     "loop_design": (1169, 9, 7),
     "metric": (527, 3, 4),
@@ -33,7 +33,7 @@ BUDGET = {  # room: lines, modules, classes
     "report": (6160, 46, 44),
     "sampled_loop": (1889, 9, 32),
     "search": (961, 8, 6),
-    "simulation": (5280, 34, 77),
+    "simulation": (5292, 34, 77),
     "spec": (5817, 30, 52),
     "stages": (1309, 10, 13),
     "sweep": (517, 5, 8),
@@ -43,7 +43,7 @@ BUDGET = {  # room: lines, modules, classes
     "words": (1011, 7, 0),
 }  # fmt: skip
 FUNCTIONS = 4750  # of the package
-TEST_LINES = 44_200
+TEST_LINES = 44_400
 
 
 def counted() -> dict[str, tuple[int, int, int]]:
