@@ -310,7 +310,7 @@ class Attack:
                     for share in (0.0, 0.5, 0.5, 1.0):
                         s, at = (i + share) * h, base + share * h * slopes[-1]
                         wanted = self.input(now + s, command)
-                        u = acting + (wanted if m.hold == "continuous" and not m.family else held)
+                        u = acting + (wanted if m.hold == "continuous" else held)
                         real = m.field(self.p, at[:n], u) + push + H @ (a + (b - a) * s / length)
                         slopes.append(np.concatenate([real, m.field(middle, at[n:], wanted) + miss]))
                     y = base + h / 6 * (slopes[1] + 2 * slopes[2] + 2 * slopes[3] + slopes[4])
