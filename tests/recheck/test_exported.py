@@ -125,6 +125,14 @@ def test_a_formula_of_which_doubles_lose_more_than_is_allowed_is_refused():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("plan", ["wave", "again", "family", "cubics"])
+def test_code_that_holds_what_is_proven_to_change_within_a_sample_is_refused(plan):
+    """No export writes it, but anybody can: u* is then off by its rate times a sample, of which no row knows."""
+    own = PLANS[plan] | {"hold": "continuous"}
+    assert "within a sample" in examined(text_of(**own), files_for(**own))
+
+
+@pytest.mark.slow
 def test_a_changed_a_missing_and_a_further_file_are_refused():
     text, files = text_of(), files_for()
     for name in files:

@@ -31,7 +31,7 @@ from tubecert.recheck.program import Program
 from tubecert.recheck.sampled_loop.record import Certificate, Proven, read_certificate, single
 from tubecert.recheck.sampled_loop.windows import Course, course_of
 from tubecert.recheck.specification import SampledSpecification
-from tubecert.recheck.specified.trajectory import Expressed
+from tubecert.recheck.specified.trajectory import Expressed, Resting
 from tubecert.recheck.terms import operation, variable
 
 _SHIPPED: Final = Path(__file__).parents[2] / "controller"
@@ -70,6 +70,8 @@ def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, 
     try:
         if proven is None:
             raise ValueError("nothing is certified")
+        if spec.hardware.hold == "continuous" and not isinstance(spec.trajectory, Resting):
+            raise ValueError("u* is proven to change within a sample, and code holds it")
         held = HeldPlan(course_of(spec, proven.plan), texts.get("x", ()), texts.get("u", ()))
         found = _PLAN.search(files[_DATA].decode("ascii"))
         xs, us = map(_rows, found.groups() if found else ())
