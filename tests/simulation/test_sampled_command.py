@@ -9,6 +9,7 @@ from loops import ABOUT, proven
 
 import tubecert as tc
 from tubecert.sampled_loop.record import Notes, certificate_text, seal
+from tubecert.simulation.sampled import campaign
 
 pytestmark = pytest.mark.slow
 
@@ -65,3 +66,27 @@ def test_what_means_nothing_here_is_refused(option):
     found = run("simulate", "scalar.yaml", "--certificate", "scalar.json", *option.split())
     assert found.exit_code == 2
     assert "sampled loop" in found.stderr
+
+
+@pytest.mark.parametrize("chunks", [0, 1])
+def test_who_interrupts_is_told_so_and_has_what_is_finished_without_figures(files, monkeypatch, chunks):
+    """The second that is left was spent on figures: 64 runs were lost. Before them not a word was said."""
+    asked = ("simulate", "scalar.yaml", "--certificate", "scalar.json", "--runs", "90")
+    assert run(*asked).exit_code == 0
+    real, left = campaign.chunk, [True] * chunks
+
+    def chunk(*arguments):
+        if not left:
+            raise KeyboardInterrupt
+        left.pop()
+        return real(*arguments)
+
+    monkeypatch.setattr(campaign, "chunk", chunk)
+    found = run(*asked, *(("-o", "new") if not chunks else ()))
+    assert found.exit_code == 130, found.output
+    if not chunks:
+        assert "tubecert: interrupted" in found.stderr
+        assert not (files / "new").exists()
+        return
+    assert found.stdout.startswith("interrupted scalar: 64 of ")
+    assert {path.name for path in (files / "scalar.simulation").iterdir()} == {"runs.npz", "summary.json"}

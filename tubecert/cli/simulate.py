@@ -129,8 +129,6 @@ def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Out
             what = "is of a loop that rests on a metric, and not of a sampled one"
             raise foreign(str(given.certificate), what)
         simulation = sampled_of(found, system, numbers, report)
-        if not simulation.runs:
-            return ExitCode.INTERRUPTED
         files = simulation.save(folder)
     present(
         output,

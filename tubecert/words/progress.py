@@ -44,7 +44,7 @@ _NEXT: Final = {
     Phase.VERIFICATION: "a smaller safe set, a wider --gap, or more time",
     Phase.CHECK: "fewer files, or --jobs",
     Phase.SWEEP: "the same command goes on where it ended",
-    Phase.SIMULATION: "fewer --runs, or --controllers for some only",
+    Phase.SIMULATION: "fewer --runs, or a shorter --duration",
     Phase.FIGURES: "the same command once more",
     Phase.RECHECK: "a smaller --budget tells earlier which claims are hard",
 }

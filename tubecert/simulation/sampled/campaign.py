@@ -5,7 +5,6 @@ Trusted: no; it can falsify a certificate, and never supports one.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -42,14 +41,20 @@ def simulate(
     seed: int,
     report: Progress | None = None,
 ) -> Campaign:
-    """All adversaries and `runs` random runs; `controllers` makes controllers, by default the tables in floats."""
+    """All adversaries and `runs` random runs; `controllers` makes controllers, by default the tables in floats.
+
+    Of an interruption what is finished is kept; it is raised where nothing is.
+    """
     attack, found = Attack(setting=setting, seed=seed), list[Seen]()
     asked, size = len(attack.aims) + runs, LANES if setting.spec.trajectory.bundle is None else _PLANS
-    with suppress(KeyboardInterrupt):
+    try:
         for first, last in pairwise(ends(asked, min(_FIRST, size), size)):
             if report is not None:
                 report(Step(phase=Phase.SIMULATION, done=first, of=asked))
             found.append(chunk(attack, attack.lanes(first, last), controllers))
+    except KeyboardInterrupt:
+        if not found:
+            raise
     code: Literal["c", "floats"] = "c" if controllers else "floats"
     return Campaign(attack=attack, certificate=certificate, asked=asked, controller=code, found=tuple(found))
 
@@ -112,7 +117,7 @@ class Passed(NamedTuple):
 class Campaign:
     """What was run of what was `asked`: chunks of lanes in the order of their numbers, with what was seen of them.
 
-    All but `outcome` and `runs` needs one chunk at least. `controller`: the exported C code, or its tables in floats.
+    `controller`: the exported C code, or its tables in floats.
     """
 
     attack: Attack
@@ -154,8 +159,6 @@ class Campaign:
     @property
     def outcome(self) -> Literal["falsified", "no result", "interrupted", "not falsified"]:
         """What it came to."""
-        if not self.found:
-            return "interrupted"
         entered = any(own.proven and own.distance < 0 for own in self.passed)
         if entered or self.outside or any(own.beyond for own in self.went.values()):
             return "falsified"

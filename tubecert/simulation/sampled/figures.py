@@ -21,10 +21,11 @@ _KEPT: Final = ("share", "when", "value", "bound", "left", "slack")
 
 
 def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
-    """Of a campaign of one run at least, beside its summary; the same campaign gives the same bytes."""
+    """Beside its summary, figures only of what was not interrupted; the same campaign gives the same bytes."""
     arrays = {name: campaign.all(name) for name in _KEPT} | {"names": np.array(campaign.setting.names)}
     yield "runs.npz", npz({**arrays, "profile": campaign.profile, "aimed": campaign.aimed})
-    yield from images(DRAWERS, campaign)
+    if campaign.runs == campaign.asked:  # to draw takes longer than who is interrupted has
+        yield from images(DRAWERS, campaign)
 
 
 def _title(campaign: Campaign) -> str:
