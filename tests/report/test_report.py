@@ -269,3 +269,15 @@ def test_half_widths_narrower_than_asked_for_are_told_with_what_limits_the_tube(
     assert f"; {second} limits the tube, with the half-width that is asked for" in told
     result["tube"]["half_widths"][first] = 0.499
     assert "wish" not in shown(result)
+
+
+def test_gains_that_do_not_serve_are_not_told_as_those_of_a_certificate():
+    """`gains ..., by certificate A (26)` stood below `refuted`, and what would lower certified gains beside it."""
+    text = shown(refuted_gains(), width=120)
+    assert "  gains       omega = 5 rad/s, Gamma = 100, refuted by certificate A (26)\n" in text
+    assert "That condition is proven not to hold." in text, "it stands above, not below"
+    limited = certified(verdict="undecided")
+    reason = {**undecided()["reasons"][0]}
+    limited["reasons"] = [reason, *limited["reasons"]]
+    assert "sets the bandwidth" in shown(certified())
+    assert "sets the bandwidth" not in shown(limited)

@@ -54,6 +54,12 @@ def test_a_certificate_that_is_not_stated_for_wind_says_so():
     )
     calm = replace(windy, claim=replace(windy.claim, wind=None))
     assert not list(beyond_its_theorem(calm))
+    decides = replace(windy, decided_by=("conditions_26",))
+    assert not list(less_by_distance(decides)), "WINDY says itself what decides"
+    [told] = beyond_its_theorem(decides)
+    assert told == ("help", "B distance is stated for them as well: --conditions B"), (
+        "the first line says why"
+    )
 
 
 @pytest.mark.slow

@@ -117,11 +117,11 @@ def _meaning(result: Result) -> str:
             return "The plan itself asks more of an input than its limits allow, whatever the gains."
         case Verdict.REFUTED if result.tube is not None and result.tube.rho_r is not None:
             return (
-                "The condition below is proven not to hold. It is a sufficient one: that it fails does not prove that "
+                "That condition is proven not to hold. It is a sufficient one: that it fails does not prove that "
                 "the state leaves the tube."
             )
         case Verdict.REFUTED:
-            return "The claim below is proven false, so nothing that rests on it is certified."
+            return "That claim is proven false, so nothing that rests on it is certified."
         case _:
             return "This is neither proven nor refuted; it must not be relied on."
 
@@ -215,12 +215,12 @@ def _brief(result: Result) -> Iterator[tuple[str, str]]:
     if result.tube is not None:
         yield from _brief_tube(result, result.tube)
     for row in deciding(result):
-        yield "gains", f"{row.text()}, by certificate {NAMES[row.section]}"
+        how = "" if row.verdict is Verdict.CERTIFIED else f"{row.verdict} "
+        yield "gains", f"{row.text()}, {how}by certificate {NAMES[row.section]}"
     yield from less_by_distance(result)
     yield from beyond_its_theorem(result)
-    for reason in result.reasons:
-        if reason.verdict is Verdict.CERTIFIED:
-            yield from _limits(reason)
+    if result.verdict is Verdict.CERTIFIED:  # else it says above what would help
+        yield from (row for reason in result.reasons for row in _limits(reason))
     for own in result.inputs:
         yield from ((f"input {own.input}", told) for told in reach.input_lines(result, own))
     yield from (("clearance", told) for told in reach.clearances(result))
@@ -290,11 +290,18 @@ def _adaptation(row: Gains) -> Fraction:
 
 
 def beyond_its_theorem(result: Result) -> Iterator[tuple[str, str]]:
-    """Why certificate A decides nothing though it has gains: what acts is more than it is stated for."""
+    """Why certificate A is undecided though it has gains: what acts is more than it is stated for.
+
+    Where it decides the first line says so: then what to do, unless certificate B was found to serve.
+    """
     section = result.sections.get(RATES.key)
     acts = result.claim.wind is not None or result.claim.parameters is not None
-    if acts and section is not None and section.verdict == Verdict.UNDECIDED:
+    if not acts or section is None or section.verdict != Verdict.UNDECIDED:
+        return
+    if RATES.key not in result.decided_by:
         yield "undecided", f"certificate {NAMES[RATES.key]}: {SAYS['wind_not_covered']}"
+    elif not list(less_by_distance(result)):
+        yield "help", f"{NAMES[DISTANCE.key]} is stated for them as well: --conditions B"
 
 
 def without_adaptation(result: Result) -> Iterator[tuple[str, str]]:
