@@ -134,6 +134,7 @@ def test_every_page_has_meaning_formula_and_source(topic):
     ("asked", "head"),
     [
         *[("tc302", "TC302"), ("du", "feedback_gain (du)"), ("A", "A: certificate A"), ("a", "lower (a)")],
+        *[("fills x2", "budget"), ("input F", "inputs"), ("not proven", "undecided"), ("settled", "attack")],
         *[("(26c)", "26c"), ("ccm_2", "CCM_2"), ("C2", "CCM_2"), ("f(X)", "F(x)")],
     ],
 )

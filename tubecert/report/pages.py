@@ -154,6 +154,7 @@ def find(topic: str) -> Page | None:
     if wanted in words():  # A and B are certificates before they are constants
         return words()[wanted]
     wanted = wanted[1:-1] if wanted.startswith("(") else wanted
+    wanted = re.sub(r"^(fills|input) \S+$", r"\1", wanted)  # rows about a state or an input
     wanted = re.sub(r"^C([123])$", r"CCM_\1", wanted, flags=re.IGNORECASE)  # as reports call them
     tables: tuple[Mapping[str, Page], ...] = (codes(), constants(), equations())
     symbols: Mapping[str, Page] = {page.symbol: page for page in constants().values()}
