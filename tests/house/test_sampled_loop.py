@@ -34,7 +34,7 @@ SHARED = [
     "tubecert.report.figures_axes",
     "tubecert.simulation.lanes",
     "tubecert.simulation.plans",
-    "tubecert.simulation.plots",
+    "tubecert.simulation.figures",
 ]
 LOADS = """
 import importlib, json, sys

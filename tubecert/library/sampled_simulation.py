@@ -55,7 +55,7 @@ class SampledSimulation:
 
         Raises `KeyError` for a name that is none, or of which there is nothing to draw.
         """
-        from tubecert.simulation.plots import drawn
+        from tubecert.simulation.figures import drawn
         from tubecert.simulation.sampled.figures import DRAWERS
 
         found = drawn(DRAWERS, name, self.campaign)

@@ -79,7 +79,7 @@ class Simulation:
         Raises `KeyError` for a name that is none, or of which there is nothing to draw.
         """
         from tubecert.simulation.adaptive.figures import DRAWERS
-        from tubecert.simulation.plots import drawn
+        from tubecert.simulation.figures import drawn
 
         found = drawn(DRAWERS, name, self.campaign)
         if found is None:

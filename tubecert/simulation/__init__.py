@@ -9,6 +9,6 @@ imports this one.
 | `lanes` | runs as lanes of one vector: Runge-Kutta steps of any system, peaks, what is seen at output times |
 | `plans` | random plans of a family, as lanes |
 | `obstacles` | how near points come to an obstacle |
-| `plots` | colours, labels, legends, obstacles in a plane; a figure as files |
+| `figures` | colours, labels, legends, obstacles in a plane; a figure as files |
 | `folder` | a folder that is tried before any work is done, and to which the summary comes last |
 """

@@ -12,8 +12,8 @@ from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.simulation.adaptive.campaign import Campaign
 from tubecert.simulation.adaptive.setting import Loop, Setting
-from tubecert.simulation.plots import COLORS, TUBE, blank, images, labelled, names_of, titled
-from tubecert.simulation.plots import plane as plane_of
+from tubecert.simulation.figures import COLORS, TUBE, blank, images, labelled, names_of, titled
+from tubecert.simulation.figures import plane as plane_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.simulation.figures import COLORS, TUBE, blank, images, labelled, names_of, plane, titled
 from tubecert.simulation.folder import npz
-from tubecert.simulation.plots import COLORS, TUBE, blank, images, labelled, names_of, plane, titled
 from tubecert.simulation.sampled.campaign import Campaign
 
 if TYPE_CHECKING:
