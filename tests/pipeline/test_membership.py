@@ -157,6 +157,20 @@ def test_beside_hardware_inputs_move_as_the_family_says(tmp_path, family, at, ho
     assert told == (1 if at[1] == 0.2 else 0)
 
 
+@pytest.mark.parametrize(("after", "belongs"), [("nothing", True), ("rest", False), ("repeat", False)])
+def test_a_plan_that_goes_on_after_its_horizon_is_proven_no_further(after, belongs):
+    """It moves at t = 1, where the plant would have to stand still: the family has no such plan, and a defect of 0."""
+    plan = '{kind: expressions, x: ["0.1*sin(t)", "0.1*cos(t)"], u: ["0*t"], horizon: 1, afterwards: AFTER}'
+    family = load_text(RATED.replace("defect: 5", "defect: 0"))
+    text = RATED.replace(
+        RATED.split("trajectory: ")[1].split("\n", maxsplit=1)[0], plan.replace("AFTER", after)
+    )
+    own = load_text(text.replace("{within: 0.1}", "{at: [0, 0.1]}"))
+    (found,) = membership(own, family, "it")
+    assert ("is a plan of the family" in found.message) == belongs
+    assert ("goes on after its horizon" in found.message) != belongs
+
+
 def test_the_last_input_of_a_held_plan_is_not_reached(tmp_path, family):
     table(tmp_path, [(0, 0.5, 0, 0.5), (1, 0.5, 0, 0.5), (2, 0.5, 0, 9)])
     plan = tmp_path / "held.yaml"

@@ -70,7 +70,7 @@ def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None
     if not plan.defined:
         part = _Part(kept=None, words="f or B is not defined at one of its knots")
         return [part.finding(name)]
-    parts = [*_horizon(plan, family), *_boxes(plan, family, bundle, effort or Effort())]
+    parts = [*_horizon(plan, spec, family), *_boxes(plan, family, bundle, effort or Effort())]
     parts += _held(plan, family, bundle, effort or Effort())
     parts.append(_defect(plan, model, bundle.defect, effort or Effort()))
     missed = [part.finding(name) for part in parts if not part.kept]
@@ -82,8 +82,11 @@ def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None
     return [Finding(code=NO_MEMBER, severity=Severity.NOTE, message=message, help=help)]
 
 
-def _horizon(plan: Plan, family: Spec) -> Iterator[_Part]:
+def _horizon(plan: Plan, spec: Spec, family: Spec) -> Iterator[_Part]:
     limit = family.trajectory.horizon
+    if spec.trajectory.afterwards != "nothing" and not plan.is_constant:
+        words = "it goes on after its horizon, and only what is before is proven: leave afterwards out"
+        yield _Part(kept=False, words=words)
     if limit is not None and (plan.horizon is None or plan.horizon > limit):
         words = f"it lasts longer than the {near(limit)} s that the family is certified for"
         yield _Part(kept=False, words=words)
