@@ -101,6 +101,12 @@ class Inequalities:
         made = Responses(remainders.loop, controller, **sizes)
         return cls(controller, recipe, tuple(starts), made, remainders)
 
+    def about(self, loop: Loop, controller: Controller, recipe: Recipe, starts: Sequence[int]) -> bool:
+        """Whether they are those of a loop and its controller, for a recipe and stages."""
+        own, made = self.responses, (loop, loop, controller, controller, recipe, recipe.lags, tuple(starts))
+        whose = self.loop, own.loop, self.controller, own.dynamics.controller
+        return (*whose, self.recipe, own.lags, self.starts) == made
+
     @property
     def loop(self) -> Loop:
         """The loop that they are about."""
@@ -131,9 +137,7 @@ class Inequalities:
         k = np.arange(self.last + 1)
         lag = np.minimum(k, own.lags)
         boxes_of_xi = np.array([phase.core for phase in phases])
-        begins = np.pad(
-            self.loop.start.reach, (0, boxes_of_xi.shape[1] - self.loop.states)
-        )  # 0 at boot: zeta, v
+        begins = np.pad(self.loop.start.reach, (0, boxes_of_xi.shape[1] - self.loop.states))  # 0 at boot
         widest = phases[0]._replace(core=np.maximum(boxes_of_xi.max(axis=0), begins))
         constant = own.noise + own.wind + total(own.rounding, off)
         b = widest.met(own.now) + constant[lag] + self.slow(sizes) + self.first(k) + self._tail(phases, k)
@@ -190,10 +194,7 @@ class Inequalities:
         """What |eta'|, |eta(0)| and |eta| count in every row, (K, R, r) each."""
         own, n, cuts = self.responses, self.loop.states, self.recipe.cuts
         k, (R, r) = np.arange(self.last + 1)[:, None, None], own.eta.shape[1:]
-        about = [
-            *np.tile(np.arange(n), len(own.nodes)),
-            *range(n, len(cuts)),
-        ]  # of e, delta, zeta in each row
+        about = [*np.tile(np.arange(n), len(own.nodes)), *range(n, len(cuts))]  # row by row: e, delta, zeta
         cut = np.array(cuts, dtype=np.intp).reshape(len(cuts), r)[about]
         lag = np.minimum(k, own.lags)
         rows, column = np.arange(R)[None, :, None], np.arange(r)[None, None]
@@ -248,13 +249,13 @@ def check(
 ) -> Checked:
     """Whether the loop keeps to the stages, for everything that the specification lets happen.
 
-    `inequalities` of this loop, controller and recipe may be handed in by whoever has them already.
+    `inequalities` may be handed in by whoever has them already: those about something else are made again.
     """
     require_ieee()
     if not _sound(loop, controller, stages, recipe):
         return Checked(verdict=Verdict.UNDECIDED, lacks=(Lack(kind="not_proven"),))
     starts = [own.start for own in stages]
-    if inequalities is None:
+    if inequalities is None or not inequalities.about(loop, controller, recipe, starts):
         inequalities = Inequalities.made(Remainders(loop, recipe.windows), controller, recipe, starts)
     above, below = (Boxes.of(stages, loop.model, above=side) for side in (True, False))
     with np.errstate(all="ignore"):  # what is not finite bounds nothing
@@ -352,7 +353,7 @@ def _wishes(loop: Loop, stages: Sequence[Stage]) -> list[Lack]:
 
 def _inputs(loop: Loop, remainders: Remainders, boxes: Boxes) -> tuple[tuple[InputUse, ...], list[Lack]]:
     """What every input takes, and which of them leaves its limits."""
-    limits = dict(loop.spec.limits)
+    limits, room = dict(loop.spec.limits), remainders.room
     low, high = remainders.inputs_range
     U = boxes.U.max(axis=0) + PLAN_ROUNDING * remainders.inputs_above
     uses, lacks = [], []
@@ -363,6 +364,5 @@ def _inputs(loop: Loop, remainders: Remainders, boxes: Boxes) -> tuple[tuple[Inp
         given = limits.get(name)
         uses.append(InputUse(input=name, range=ends, limits=given))
         if given is not None and not (given[0] <= ends[0] and ends[1] <= given[1]):
-            room = float(remainders.room[j])
-            lacks.append(Lack(kind="inputs", where=name, needed=float(U[j]), allowed=room))
+            lacks.append(Lack(kind="inputs", where=name, needed=float(U[j]), allowed=float(room[j])))
     return tuple(uses), lacks
