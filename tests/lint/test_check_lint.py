@@ -233,6 +233,7 @@ def test_a_rounded_point_is_told_to_be_one():
     assert (finding.code, finding.severity) == ("TC404", Severity.NOTE)
     assert re.search(r"equilibrium up to a rounding.*\(v would move\), 0\.\d+ % of", finding.message)
     assert finding.help.startswith("nothing is wrong")
+    assert "more digits (input: [" in finding.help
     [finding] = found(changed(("input: [0]", "input: [1]")))
     assert (finding.severity, "no equilibrium" in finding.message) == (Severity.WARNING, True)
 
@@ -265,6 +266,12 @@ def test_the_equilibrium_near_a_point_is_written_out():
         if item.code == "TC404"
     ]
     assert [item.severity for item in again] in ([], [Severity.NOTE])
+    assert not [item for item in again if new[0] in item.help], "what is written already is no remedy"
+    arm = BASE.replace('"-k*p - v"', '"19.62*sin(p)"').replace("[[0], [1]]", "[[0], [4]]")
+    there = "at: [0.08902199108, 0], input: [-0.436076355268]"  # 12 digits leave 2e-12
+    told = found(arm.replace("at: [0, 0], input: [0]", there))
+    helps = [item.help for item in told if item.code == "TC404"]
+    assert helps == ["nothing is wrong: the proof counts it in; expressions (input: [m*g]) help"]
     [finding] = found(changed(("input: [0]", "input: [1]")))
     assert "write input: [0];" in finding.help  # the point is held, by another input
 

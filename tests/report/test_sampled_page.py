@@ -11,7 +11,7 @@ import sampled
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tubecert.report import html, markdown
+from tubecert.report import html, markdown, notebook
 from tubecert.report import pages as explained
 from tubecert.report.sampled_loop import page_of
 from tubecert.report.terminal import Terminal
@@ -237,3 +237,10 @@ def test_for_how_long(changes, told):
     claim = Claim(**{"horizon": None, "afterwards": "nothing", "hold": "middle", **changes})
     text = sampled.SPEC.replace("input: [0]}", "input: [0], horizon: 5}")
     assert page_of(sampled.certificate(text, claim=claim)).summary.endswith(told)
+
+
+def test_a_page_without_figures_has_no_empty_section_and_a_card_promises_nothing_below_it():
+    certificate = sampled.certificate()
+    text = markdown.render_page(page_of(certificate))
+    assert not re.search(r"^## .*\n+(?=## |\Z)", text, re.MULTILINE)
+    assert "below" not in notebook.of_page(page_of(certificate)).split("<table>")[0]

@@ -322,7 +322,8 @@ class _Walk:
                 f"{name} is only allowed in h",
                 "elsewhere expressions must be differentiable; sqrt(x**2 + c) with c > 0 may serve. v*abs(v) is, as "
                 "drag(v) with tables: {drag: {points: [[-9, -81, 18], [0, 0, 0], [9, 81, 18]], interpolation: "
-                "slopes}}: exactly, for v in [-9, 9]; so is abs(v)**3, by [-9, 729, -243], [0, 0, 0], [9, 729, 243]",
+                "slopes}} in system: exactly, for v in [-9, 9]; so is abs(v)**3, by [-9, 729, -243], [0, 0, 0], "
+                "[9, 729, 243]",
             )
         if name in words.symbols or name in words.tables or name in FUNCTIONS or name == "pi":
             return

@@ -217,8 +217,9 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
         else:
             room = f"{up(100 * worst / bearable, 2)} % of what the tube has room for"
             message = f"the point is an equilibrium up to a rounding: {message}, {room}"
-            digits = f" ({near_by})" if near_by else ""
-            help = f"nothing is wrong: the proof counts it in; more digits{digits}, or expressions (input: [m*g]), help"
+            there = f"input: [{', '.join(near(value, 12) for value in curve.u[0])}]"
+            digits = "" if near_by == there else f"more digits{near_by and f' ({near_by})'}, or "
+            help = f"nothing is wrong: the proof counts it in; {digits}expressions (input: [m*g]) help"
         yield Finding(
             code=codes.NO_EQUILIBRIUM,
             severity=Severity.WARNING if notable else Severity.NOTE,

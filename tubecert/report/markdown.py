@@ -42,13 +42,11 @@ def _lines(page: Page) -> Iterator[str]:
 
 
 def _section(section: Section) -> Iterator[str]:
-    yield ""
-    yield f"## {escape(section.title)}"
-    for block in section.blocks:
-        lines = list(_block(block))
-        if lines:
-            yield ""
-            yield from lines
+    """Nothing of a section that has figures only."""
+    shown = [lines for block in section.blocks if (lines := list(_block(block)))]
+    for lines in ([f"## {escape(section.title)}"], *shown) if shown else ():
+        yield ""
+        yield from lines
 
 
 def _block(block: Block) -> Iterator[str]:

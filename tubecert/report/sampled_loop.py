@@ -80,7 +80,7 @@ def _meaning(result: Result) -> str:
         return "This is neither proven nor refuted; it must not be relied on."
     return (
         f"With this controller ({loop(result.spec.effective)}) every state stays within its half-width of "
-        f"{plan(result)} {extent(result)} if it starts {_start(result)}, under the assumptions below."
+        f"{plan(result)} {extent(result)} if it starts {_start(result)}, under the assumptions of the certificate."
     )
 
 
