@@ -411,6 +411,8 @@ def test_degrees_of_a_plan_are_decimals(tmp_path):
         ("t,p,q,u\n0,1,0,0\n1,1,,0\n", "", "a number is missing"),
         ("t,p,q,u\n0,1,0,0\n1,1\n", "", "the row has 2 cells"),
         ("t,p,q,u\n0,1,0,0\n1,1e-299,0,0\n", ", columns: {p: {scale: 1e-9}}", "in its scale is nearer to 0"),
+        ("t,p,q,u\n0,1,0,0\n1,1,0,0\n", ", columns: {t: {scale: -1}}", "columns.t.scale is -1"),
+        ("t,p,q,u\n0,1,0,0\n1,1,0,0\n", ", columns: {p: {scale: 0}}", "columns.p.scale is 0"),
         ("t,p,v,u\n0,1,0,0\n1,1,0,0\n", ", columns: {}", "lacks a column q"),
         (
             "user,name,secret,more\na,b,c,d\n",

@@ -59,6 +59,11 @@ def _read_column(name: str, field: Field | None, names: Names) -> Column | None:
     if field is not None and isinstance(field.node, Scalar):
         return Column(name=field.node.text)
     found: Column | None = Column() if field is None else _COLUMN.read(field, names)
+    if field is not None and found is not None and (not found.scale or (name == "t" and found.scale < 0)):
+        field.fail(
+            codes.RANGE, f"{field.path}.scale is {found.scale}", "write 1/1000 for ms, 1 deg for degrees"
+        )
+        return None
     return found and replace(found, name=found.name or name)
 
 
