@@ -135,6 +135,7 @@ def test_verbose_shows_constants_and_assumptions():
         "at t = 0.785398 s",
     ):
         assert words in full
+    assert "the curve" not in full, "a terminal has none"
     for words in ("the feedback is the least k of the quadratic program", "the claim is for all t >= 0"):
         assert words in " ".join(full.split())
 

@@ -67,7 +67,7 @@ _SHARES = (
 )
 _NOTES = "Advice, curves of gains, where constants are largest and points to draw the plan by"
 _NO_LIMITS = (
-    "The specification gives no limits of the inputs, so nothing is claimed of them: the curve is the plan's."
+    "The specification gives no limits of the inputs, so nothing is claimed of them; figures show the plan's."
 )
 
 
