@@ -27,7 +27,9 @@ _INTERNAL, _UNDECIDED = 3, 4  # as in `errors.ExitCode`, which is not imported h
 _SIGNALS: Final = ("SIGINT", "SIGTERM", "SIGHUP")
 _WHY: Final[Mapping[int | None, str]] = {None: "undecided: the time was up", signal.SIGINT: "interrupted"}
 _READING: Final = "reading what it was given"
-_SHORTER: Final = "more time; powers and products of sums grow when they are multiplied out: fewer factors, or a shorter table"
+_SHORTER: Final = (
+    "more time; powers of sums grow when they are multiplied out: fewer factors, or a shorter table"
+)
 
 
 class Will(TypedDict):

@@ -64,16 +64,13 @@ class SampledSimulation:
         return found
 
     def save(self, folder: File) -> list[str]:
-        """Write summary, runs and figures into a folder, as the command does; their names. Raises `TargetError`.
-
-        Figures only if nobody interrupted; earlier ones do not stay.
-        """
+        """Write summary, runs and, of a whole campaign, figures into a folder; their names. Raises `TargetError`."""
         from tubecert.simulation.folder import prepared, written_to
         from tubecert.simulation.sampled.figures import DRAWERS, files
 
         with prepared(os.fspath(folder)):
-            outdated = [f"{name}.png" for name in DRAWERS]
-            return written_to(os.fspath(folder), self.summary, files(self.campaign), outdated)
+            figures = [f"{name}.png" for name in DRAWERS]
+            return written_to(os.fspath(folder), self.summary, files(self.campaign), figures)
 
     def __str__(self) -> str:
         from tubecert.report.sampled_simulation import verdict_line

@@ -290,10 +290,7 @@ def _adaptation(row: Gains) -> Fraction:
 
 
 def beyond_its_theorem(result: Result) -> Iterator[tuple[str, str]]:
-    """Why certificate A is undecided though it has gains: what acts is more than it is stated for.
-
-    Where it decides the first line says so: then what to do, unless certificate B was found to serve.
-    """
+    """Why certificate A is undecided though it has gains; where it decides, and so is told why, what to do."""
     section = result.sections.get(RATES.key)
     acts = result.claim.wind is not None or result.claim.parameters is not None
     if not acts or section is None or section.verdict != Verdict.UNDECIDED:

@@ -41,10 +41,7 @@ def simulate(
     seed: int,
     report: Progress | None = None,
 ) -> Campaign:
-    """All adversaries and `runs` random runs; `controllers` makes controllers, by default the tables in floats.
-
-    Of an interruption what is finished is kept; it is raised where nothing is.
-    """
+    """All adversaries and `runs` random runs, or what an interruption leaves; `controllers`: else tables in floats."""
     attack, found = Attack(setting=setting, seed=seed), list[Seen]()
     asked, size = len(attack.aims) + runs, LANES if setting.spec.trajectory.bundle is None else _PLANS
     try:
