@@ -140,6 +140,8 @@ def test_a_changed_a_missing_and_a_further_file_are_refused():
         assert "missing" in examined(text, {other: own for other, own in files.items() if other != name})
         found = examined(text, {**files, f"a_{name}": files[name]})
         assert ("none of its files" in found) == name.endswith((".c", ".h")), "what was compiled is no source"
+    taken = {**files, "controller.h.gch": b""}  # by gcc, in place of the header
+    assert "none of its files" in examined(text, taken)
     removed = files["controller.c"].replace(b"status = STATUS_BAD", b"status |= 0")
     assert "runtime" in examined(text, {**files, "controller.c": sealed(removed)})
 

@@ -85,9 +85,9 @@ def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, 
 
 
 def _changed(files: Mapping[str, bytes], certificate: str) -> str:
-    """What is not as it is shipped, or of another certificate; nothing if that is "". What was compiled is none."""
+    """What is not as it is shipped, or of another certificate; nothing if that is "". Objects are none."""
     own = {*_RUNTIME, _DATA, _README}
-    for name in sorted(own ^ {name for name in files if name in own or name.endswith((".c", ".h"))}):
+    for name in sorted(own ^ {name for name in files if name in own or name.endswith((".c", ".h", ".gch"))}):
         return f"{name[:60]} is {'none of its files' if name in files else 'missing'}"
     for name in _RUNTIME:
         if files[name] != _marked((_SHIPPED / name).read_bytes()):
