@@ -60,11 +60,19 @@ class Case:
 
 def _moving(name: str, floats: tuple[float, ...], **settings: str) -> Case:
     own = {key.replace("__", "."): value for key, value in settings.items()}
-    return Case(name=f"pvtol_moving {name}", file="pvtol_moving", floats=floats, settings=own)
+    wished = _wishes(("px", "pz", "phi", "vx", "vz", "w"), floats)
+    return Case(name=f"pvtol_moving {name}", file="pvtol_moving", floats=floats, settings=own | wished)
 
 
 def _orbit(name: str, floats: tuple[float, ...], settings: Mapping[str, str]) -> Case:
-    return Case(name=f"orbit {name}", file="orbit", floats=floats, settings=settings)
+    wished = _wishes(("x1", "x2"), floats)
+    return Case(name=f"orbit {name}", file="orbit", floats=floats, settings={**settings, **wished})
+
+
+def _wishes(names: tuple[str, ...], floats: tuple[float, ...]) -> dict[str, str]:
+    """In place of the wishes of the file, which are about another question: 1.2 times what floats had found."""
+    told = ", ".join(f"{name}: {1.2 * width:.3g}" for name, width in zip(names, floats, strict=False))
+    return {"tube.half_widths": f"{{{told}}}"}
 
 
 CASES = (
