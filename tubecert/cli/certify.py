@@ -221,7 +221,7 @@ def _show(
     from tubecert.library.stated import page_of
     from tubecert.report import text
 
-    closing, page = list(files), page_of(found.certificate)
+    closing, page = list(files), page_of(found.certificate, all_of_it=output.verbose)
     target = dict(closing)["certificate"]
     data = found.text if output.json or target == certificate.STDOUT else None
     present(output, text.headline(page), lambda: text.screen(page, closing, verbose=output.verbose), data)

@@ -19,8 +19,8 @@ from tubecert.printable import printable_json, visible
 from tubecert.report.claimed import NOT_RECHECKED
 
 if TYPE_CHECKING:
-    from tubecert.library.pages import AnyCertificate
     from tubecert.report.page_simulation import Simulated
+    from tubecert.report.quantities import AnyCertificate
 
 
 def run(source: str, targets: Sequence[str] | None, simulation: str | None, output: Output) -> None:

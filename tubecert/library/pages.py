@@ -6,7 +6,7 @@ import json
 import os
 from dataclasses import dataclass, field
 from html import escape
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Final
 
 from tubecert import files
 from tubecert.certificate.file import write_text
@@ -20,12 +20,9 @@ from tubecert.report import html, markdown
 from tubecert.report.page_simulation import TITLES, Simulated
 
 if TYPE_CHECKING:
-    from tubecert.certificate.result import Certificate
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
-    from tubecert.sampled_loop.record import Certificate as SampledCertificate
-
-AnyCertificate: TypeAlias = "Certificate | SampledCertificate"
+    from tubecert.report.quantities import AnyCertificate
 
 HTML, MARKDOWN = (".html", ".htm"), (".md", ".markdown")
 _FOLDER: Final = files.Kind(

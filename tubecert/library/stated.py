@@ -24,12 +24,12 @@ from tubecert.verdict import Verdict
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from tubecert.certificate.result import Certificate
     from tubecert.report.page import Page
     from tubecert.report.page_simulation import Simulated
+    from tubecert.report.quantities import AnyCertificate
 
 
-C = TypeVar("C", bound="Certificate | SampledCertificate")
+C = TypeVar("C", bound="AnyCertificate")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -106,7 +106,7 @@ class Stated(Generic[C]):
     def __str__(self) -> str:
         from tubecert.report.text import headline
 
-        return headline(page_of(self.certificate)).plain
+        return headline(page_of(self.certificate, all_of_it=False)).plain
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self}>"
@@ -114,18 +114,20 @@ class Stated(Generic[C]):
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.of_page(page_of(self.certificate))
+        return notebook.of_page(page_of(self.certificate, all_of_it=False))
 
 
-def page_of(certificate: Certificate | SampledCertificate, simulated: Simulated | None = None) -> Page:
-    """The page about a certificate, with what a simulation of it has shown."""
+def page_of(
+    certificate: AnyCertificate, simulated: Simulated | None = None, *, all_of_it: bool = True
+) -> Page:
+    """The page about a certificate, with what a simulation of it has shown; or what is seen first of it."""
     if isinstance(certificate, SampledCertificate):
         from tubecert.report import sampled_loop
 
-        return sampled_loop.page_of(certificate, simulated)
+        return sampled_loop.page_of(certificate, simulated, all_of_it=all_of_it)
     from tubecert.report import certificate_page
 
-    return certificate_page.page_of(certificate, simulated)
+    return certificate_page.page_of(certificate, simulated, all_of_it=all_of_it)
 
 
 def rounded_up(value: Fraction) -> float:

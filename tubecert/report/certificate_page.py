@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
+from itertools import islice
 
 from tubecert.bounds.meanings import EVERY, meaning
 from tubecert.certificate.follows import InputData
@@ -71,19 +72,19 @@ _NO_LIMITS = (
 )
 
 
-def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Page:
-    """The page of a certificate, whatever its verdict; the same before it is written and after it is read back."""
+def page_of(certificate: Certificate, simulated: Simulated | None = None, *, all_of_it: bool = True) -> Page:
+    """The page of a certificate, the same once it is read back; or its first section alone, and nothing is drawn."""
     result = certificate.result
     holds = result.verdict is Verdict.CERTIFIED
     return Page(
         name=result.spec.effective.name,
         verdict=result.verdict,
-        summary=_numbers(result) if holds else _because(result),
+        summary=_numbers(result) if holds else "" if result.reason is None else sentence(result.reason),
         claim=_claim(result) if holds else "",
         meaning=_meaning(result),
         caveat=claimed.NOT_RECHECKED,
         tiles=tuple(_tiles(result)),
-        sections=tuple(_sections(certificate, simulated)),
+        sections=tuple(islice(_sections(certificate, simulated), None if all_of_it else 1)),
     )
 
 
@@ -96,11 +97,6 @@ def _numbers(result: Result) -> str:
     chosen, extent = deciding(result), reach.extent(result)
     numbers = [f"rho = {extent}" if reach.is_radius(result) else extent]
     return "; ".join([*numbers, *(gains.text(titled=len(chosen) > 1) for gains in chosen)])
-
-
-def _because(result: Result) -> str:
-    """The reason that decided: the first with the verdict's own word."""
-    return "" if result.reason is None else sentence(result.reason)
 
 
 def _meaning(result: Result) -> str:

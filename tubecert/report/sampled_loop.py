@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
+from itertools import islice
 from typing import Final
 
 from tubecert.certificate.effective import Effective
@@ -40,24 +41,10 @@ _LAW: Final = (
 )
 
 
-def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Page:
-    """The page of a certificate, whatever its verdict."""
-    result, notes = certificate.result, certificate.notes
-    own, drawn = result.spec.effective, tuple(figures(certificate))
-    sections: Sequence[tuple[str, str, Iterable[Block]]] = (
-        ("loop", "The loop", _screen(result, notes)),
-        ("figures", "Figures", [Figures(figures=drawn)] if drawn else []),
-        (
-            "tube",
-            "Half-widths, and what fills them",
-            [_widths(result, own.system.states, notes)] if result.tube else [],
-        ),
-        ("simulation", "Simulation", [] if simulated is None else simulated_blocks(simulated)),
-        ("assumed", "Assumed, not proven", [Items(items=tuple(assumed(result)))]),
-        ("system", "The specification", [*system(own, result.spec.settings), *_law(own)]),
-        ("origin", "Where it comes from", [_origin(certificate)]),
-        ("check", "Check it again", _again(own)),
-    )
+def page_of(certificate: Certificate, simulated: Simulated | None = None, *, all_of_it: bool = True) -> Page:
+    """The page of a certificate, whatever its verdict; or its first section alone, for which nothing is drawn."""
+    result, sections = certificate.result, _sections(certificate, simulated)
+    own = result.spec.effective
     found = (Section(key=key, title=title, blocks=tuple(blocks)) for key, title, blocks in sections)
     return Page(
         name=own.name,
@@ -71,8 +58,25 @@ def page_of(certificate: Certificate, simulated: Simulated | None = None) -> Pag
             )
             for name, width in [*result.half_widths.items()][:_TILES]
         ),
-        sections=tuple(section for section in found if section.blocks),
+        sections=tuple(islice((each for each in found if each.blocks), None if all_of_it else 1)),
     )
+
+
+def _sections(
+    certificate: Certificate, simulated: Simulated | None
+) -> Iterator[tuple[str, str, Iterable[Block]]]:
+    result, notes = certificate.result, certificate.notes
+    own = result.spec.effective
+    yield "loop", "The loop", _screen(result, notes)
+    drawn = tuple(figures(certificate))
+    yield "figures", "Figures", [Figures(figures=drawn)] if drawn else []
+    widths = [_widths(result, own.system.states, notes)] if result.tube else []
+    yield "tube", "Half-widths, and what fills them", widths
+    yield "simulation", "Simulation", [] if simulated is None else simulated_blocks(simulated)
+    yield "assumed", "Assumed, not proven", [Items(items=tuple(assumed(result)))]
+    yield "system", "The specification", [*system(own, result.spec.settings), *_law(own)]
+    yield "origin", "Where it comes from", [_origin(certificate)]
+    yield "check", "Check it again", _again(own)
 
 
 def _meaning(result: Result) -> str:

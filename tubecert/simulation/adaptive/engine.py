@@ -46,17 +46,18 @@ def integrate(batches: Sequence[Batch], *, tolerance: float, level: int | None =
     if level is None:
         lanes.halve(tolerance)
     else:
-        lanes.run(np.arange(lanes.N), level)
+        lanes.grid = lanes.run(np.arange(lanes.N), level)
     return lanes.runs()
 
 
 class _Lanes:
     """Lanes on their way down the levels; arrays have the lanes last, as in `lanes.Found`.
 
-    `found` (once a level has run) is of every lane the last of its levels.
+    Once a level has run, `grid` is that of the first, and `found` of every lane what its last one found.
     """
 
     found: Found
+    grid: Grid
 
     def __init__(self, batches: Sequence[Batch]) -> None:
         self.batches, self.problem = batches, batches[0].problem
@@ -76,11 +77,11 @@ class _Lanes:
     def halve(self, tolerance: float) -> None:
         """Level after level, of the lanes that are not done."""
         lanes = np.arange(self.N)
-        for level in range(_LEVELS):
-            before = self.found if level else None
+        self.grid = self.run(lanes, 0)
+        for level in range(1, _LEVELS):
+            before = self.found
             grid = self.run(lanes, level)
-            if before is not None:
-                lanes = lanes[~self._compare(lanes, before, grid, tolerance)]
+            lanes = lanes[~self._compare(lanes, before, grid, tolerance)]
             if not len(lanes):
                 break
 
@@ -140,11 +141,10 @@ class _Lanes:
 
     def runs(self) -> tuple[Runs, ...]:
         """Batch by batch."""
-        grid = steps(self.problem, 0, self.plans)
-        return tuple(self._runs(batch.problem.plan, slice(a, b), grid) for batch, a, b in self._parts())
+        return tuple(self._runs(batch.problem.plan, slice(a, b)) for batch, a, b in self._parts())
 
-    def _runs(self, plan: Plan, lanes: slice, grid: Grid) -> Runs:
-        found, own = self.found, next(i for i, each in enumerate(self.plans) if each is plan)
+    def _runs(self, plan: Plan, lanes: slice) -> Runs:
+        found, grid, own = self.found, self.grid, next(i for i, each in enumerate(self.plans) if each is plan)
         times, stopped = found.peak_time, np.flatnonzero(found.stopped[lanes]) + lanes.start
         peaks = {name: Peak(value=peak[lanes], time=times[name][lanes]) for name, peak in found.peak.items()}
         seen = {name: np.moveaxis(part[..., lanes], -1, 0) for name, part in found.seen.items()}
