@@ -14,8 +14,7 @@ from tubecert.conditions.rates import RateRecipe, margins_26_along
 from tubecert.conditions.verdict import Verdict
 from tubecert.enclosure.interval import Interval
 from tubecert.kernel import judge
-from tubecert.kinds.distance import DistanceSection
-from tubecert.kinds.rates import RatesSection
+from tubecert.kinds.kind import Section
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline import Options, question_of
 from tubecert.pipeline.certification import answer
@@ -136,12 +135,12 @@ def _judged(letter: str, problem: TubeProblem, asked: dict[str, Any]) -> Any:
     return kind.section(problem, PROPOSERS[kind.theorem.recipe].propose(problem, wanted))
 
 
-def judged_26(problem: TubeProblem, **asked: Any) -> RatesSection:
+def judged_26(problem: TubeProblem, **asked: Any) -> Section[RateRecipe]:
     """What is proposed and decided for certificate A."""
     return _judged("A", problem, asked)
 
 
-def judged_distance(problem: TubeProblem, **asked: Any) -> DistanceSection:
+def judged_distance(problem: TubeProblem, **asked: Any) -> Section[DistanceRecipe]:
     """What is proposed and decided for certificate B."""
     return _judged("B", problem, asked)
 

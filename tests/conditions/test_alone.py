@@ -15,7 +15,7 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked
 from tubecert.conditions.verdict import Verdict
 from tubecert.kernel import Proof, check
-from tubecert.kinds.alone import Alone
+from tubecert.kinds.alone import KIND
 from tubecert.search.proposers import PROPOSERS
 
 LESS = 1 - 1e-9
@@ -36,7 +36,7 @@ def problem(horizon=None, rho="1", **values):
 
 
 def section(of):
-    return Alone().section(of, PROPOSERS[NoGains].propose(of, Asked()))
+    return KIND.section(of, PROPOSERS[NoGains].propose(of, Asked()))
 
 
 @pytest.mark.slow
@@ -71,7 +71,7 @@ def test_a_tube_that_no_gains_could_hold_is_refuted(values, claim):
     found = section(problem(**values))
     assert found.verdict is Verdict.REFUTED
     assert [item.claim for item in found.shortfalls] == [claim]
-    assert found.uncertainty_limit is None
+    assert found.data().uncertainty_limit is None
 
 
 def test_a_constant_without_a_bound_proves_nothing():

@@ -40,39 +40,47 @@ def unmet() -> TubeProblem:
 
 @pytest.mark.slow
 def test_three_state_corrected():
-    assert gains(judged_distance(three_state()).least_adaptation) == pytest.approx((10.8, 1.38e4), rel=5e-3)
+    assert gains(judged_distance(three_state()).at("least_adaptation")) == pytest.approx(
+        (10.8, 1.38e4), rel=5e-3
+    )
 
 
 def test_two_state_function_level():
     result = judged_distance(two_state())
-    assert gains(result.split)[0] == pytest.approx(15.136, rel=1e-3)
+    assert gains(result.at("split"))[0] == pytest.approx(15.136, rel=1e-3)
     n = two_state().floats()
     assert float(least_rate(two_state(), n, np.array([15.136]))[0][0]) == pytest.approx(2.661e5, rel=1e-3)
-    assert gains(result.least_adaptation) == pytest.approx((26.383, 6.091e4), rel=1e-3)
+    assert gains(result.at("least_adaptation")) == pytest.approx((26.383, 6.091e4), rel=1e-3)
     # P = I and A_m = -omega I: the best gain of a constant B
-    assert result.least_adaptation.recipe.predictor_gain == result.least_adaptation.recipe.bandwidth
+    assert (
+        result.at("least_adaptation").recipe.predictor_gain == result.at("least_adaptation").recipe.bandwidth
+    )
 
 
 def test_the_row_of_least_bandwidth_has_no_larger_one_than_that_of_least_adaptation():
     """With much left to rho_a the split pair had omega = 30.28 beside 26.39, and the larger Gamma."""
     result = judged_distance(two_state(epsilon=Fraction("0.3"), rho_r=Fraction("0.3"), rho_a=Fraction("0.4")))
-    assert gains(result.split) == gains(result.least_adaptation) == pytest.approx((26.39, 6.09e4), rel=1e-3)
+    assert (
+        gains(result.at("split"))
+        == gains(result.at("least_adaptation"))
+        == pytest.approx((26.39, 6.09e4), rel=1e-3)
+    )
 
 
 @pytest.mark.parametrize(("delta", "omega", "Gamma"), [(0.1, 32.2, 1.35e5), (0.3, 58.0, 1.43e6)])
 def test_two_state_with_a_plan_defect(delta, omega, Gamma):
     result = judged_distance(two_state(values={"plan_defect_metric": delta}))
-    assert gains(result.least_adaptation)[0] == pytest.approx(omega, rel=0.03)
-    assert gains(result.least_adaptation)[1] == pytest.approx(Gamma, rel=0.01)
+    assert gains(result.at("least_adaptation"))[0] == pytest.approx(omega, rel=0.03)
+    assert gains(result.at("least_adaptation"))[1] == pytest.approx(Gamma, rel=0.01)
 
 
 def printed_gains(problem: TubeProblem) -> tuple[Fraction, ...]:
     A, B = judged_26(problem), judged_distance(problem)
     return (
-        A.pair.recipe.bandwidth,
-        A.pair.recipe.adaptation_rate,
-        B.least_adaptation.recipe.bandwidth,
-        B.least_adaptation.recipe.adaptation_rate,
+        A.decisive.recipe.bandwidth,
+        A.decisive.recipe.adaptation_rate,
+        B.at("least_adaptation").recipe.bandwidth,
+        B.at("least_adaptation").recipe.adaptation_rate,
     )
 
 
@@ -123,26 +131,26 @@ def test_least_gains_of_26_against_brute_force(options):
     problem = alive(**options)
     result = judged_26(problem)
     assert result.verdict is Verdict.CERTIFIED
-    omega, Gamma = gains(result.pair)
+    omega, Gamma = gains(result.decisive)
     grid = np.geomspace(1.3e-3, 2e3, 60001)
     with np.errstate(all="ignore"):
         needed = rate_needed_by_brute_force(problem, grid)
         left = rate_margins(problem.floats(), grid, np.full_like(grid, 1e30), np.full_like(grid, 3.5))["26b"]
     feasible = grid[np.isfinite(needed)]
-    assert result.infimum == pytest.approx(feasible[0], rel=1e-3)
+    assert result.proposal.infimum == pytest.approx(feasible[0], rel=1e-3)
     admitted = grid[np.isfinite(needed) & (left >= 0.01)]
     assert omega == pytest.approx(admitted[0], rel=2e-3)
     assert Gamma == pytest.approx(float(rate_needed_by_brute_force(problem, np.array([omega]))[0]), rel=2e-3)
-    assert gains(result.least_adaptation)[1] == pytest.approx(needed.min(), rel=2e-3)
+    assert gains(result.at("least_adaptation"))[1] == pytest.approx(needed.min(), rel=2e-3)
 
 
 def test_where_26b_binds_a_hundredth_is_left():
     result = judged_26(alive(values={"M_x": 12.0}))
-    assert result.binds == "26b"
-    assert result.infimum < float(result.pair.recipe.bandwidth)
-    assert float(result.pair.margins["26b"].lo) == pytest.approx(0.01, rel=0.1)
-    assert gains(result.least_adaptation)[1] < 0.1 * gains(result.pair)[1]
-    assert judged_26(alive()).binds == "26a"
+    assert result.proposal.binds == "26b"
+    assert result.proposal.infimum < float(result.decisive.recipe.bandwidth)
+    assert float(result.decisive.margins["26b"].lo) == pytest.approx(0.01, rel=0.1)
+    assert gains(result.at("least_adaptation"))[1] < 0.1 * gains(result.decisive)[1]
+    assert judged_26(alive()).proposal.binds == "26a"
 
 
 @pytest.mark.slow
@@ -150,11 +158,11 @@ def test_where_26b_binds_a_hundredth_is_left():
 def test_printed_pairs_of_26_are_proven_and_cannot_be_smaller(options):
     problem = alive(**options)
     result = judged_26(problem, curve=True)
-    for recipe in (result.pair.recipe, result.least_adaptation.recipe, *result.curve):
+    for recipe in (result.decisive.recipe, result.at("least_adaptation").recipe, *result.curve):
         assert verdict_at(problem, recipe) is Verdict.CERTIFIED
         less = replace(recipe, adaptation_rate=recipe.adaptation_rate * Fraction("0.998"))
         assert verdict_at(problem, less) is Verdict.REFUTED
-    narrower = replace(result.pair.recipe, bandwidth=Fraction(result.infimum * 0.999))
+    narrower = replace(result.decisive.recipe, bandwidth=Fraction(result.proposal.infimum * 0.999))
     assert verdict_at(problem, narrower) is Verdict.REFUTED
     assert len(result.curve) >= 20
 
@@ -162,13 +170,13 @@ def test_printed_pairs_of_26_are_proven_and_cannot_be_smaller(options):
 def test_auto_takes_the_best_predictor_gain_of_26():
     problem = alive(predictor_gain=None)
     result = judged_26(problem, curve=True)
-    w, G = gains(result.pair)
+    w, G = gains(result.decisive)
     n = problem.floats()
     g = np.geomspace(0.01, 1000, 4001)
     margins = rate_margins(n, np.full_like(g, w), np.full_like(g, G), g)["26c"]
-    assert float(result.pair.recipe.predictor_gain) == pytest.approx(g[np.argmax(margins)], rel=0.03)
-    assert float(result.pair.margins["26c"].lo) >= margins.max() - 1e-4
-    assert gains(judged_26(alive()).pair)[1] * 1.001 > G
+    assert float(result.decisive.recipe.predictor_gain) == pytest.approx(g[np.argmax(margins)], rel=0.03)
+    assert float(result.decisive.margins["26c"].lo) >= margins.max() - 1e-4
+    assert gains(judged_26(alive()).decisive)[1] * 1.001 > G
 
 
 def least_rate_by_scan(problem: TubeProblem, omegas: np.ndarray, g: float | None) -> tuple[float, float]:
@@ -211,7 +219,7 @@ def least_rate_by_scan(problem: TubeProblem, omegas: np.ndarray, g: float | None
     ],
 )
 def test_least_gamma_against_brute_force(problem, g):
-    found = gains(judged_distance(problem).least_adaptation)
+    found = gains(judged_distance(problem).at("least_adaptation"))
     omega, Gamma = least_rate_by_scan(problem, found[0] * np.geomspace(0.5, 2, 81), g)
     assert found[1] == pytest.approx(Gamma, rel=0.03)
     assert found[1] <= Gamma * (1 + 2e-3)
@@ -222,7 +230,7 @@ def test_least_gamma_against_brute_force(problem, g):
 def test_auto_takes_the_best_predictor_gain_of_b():
     problem = alive(predictor_gain=None, values={"B_pinv_x": 300.0, "h_t": 40.0})
     low = judged_distance(problem, curve=True).curve[0].bandwidth
-    pair = judged_distance(problem, bandwidth=low).asked
+    pair = judged_distance(problem, bandwidth=low).at("asked")
     n = problem.floats()
     g = np.geomspace(0.2, 5, 2000) * float(low)
     rates = least_rate(problem, n, np.full_like(g, float(low)), g)[0]
@@ -240,43 +248,43 @@ def test_printed_pairs_of_b_are_proven_and_cannot_be_smaller(problem):
     result = judged_distance(problem, curve=True)
     assert result.verdict is Verdict.CERTIFIED
     assert len(result.curve) >= 20
-    for recipe in (result.split.recipe, result.least_adaptation.recipe, *result.curve):
+    for recipe in (result.at("split").recipe, result.at("least_adaptation").recipe, *result.curve):
         assert margin_distance(problem, recipe).lo > 0
-    for pair in (result.split, result.least_adaptation):
+    for pair in (result.at("split"), result.at("least_adaptation")):
         less = replace(pair.recipe, adaptation_rate=pair.recipe.adaptation_rate * Fraction("0.99"))
         assert theorem_b.distance_ceiling(problem, less) <= 0
     least = min(float(r.adaptation_rate) for r in result.curve)
-    assert least >= 0.999 * gains(result.least_adaptation)[1]
-    assert result.least_adaptation.ultimate_radius < float(problem.rho)
+    assert least >= 0.999 * gains(result.at("least_adaptation"))[1]
+    assert result.at("least_adaptation").ultimate_radius < float(problem.rho)
 
 
 @pytest.mark.slow
 def test_gains_asked_for_are_judged_as_given():
     problem = alive()
-    pair = judged_26(problem).pair
+    pair = judged_26(problem).decisive
     w, G = pair.recipe.bandwidth, pair.recipe.adaptation_rate
     assert judged_26(problem, bandwidth=w, adaptation_rate=G).verdict is Verdict.CERTIFIED
-    assert judged_26(problem, bandwidth=w, adaptation_rate=G).pair.recipe == pair.recipe
+    assert judged_26(problem, bandwidth=w, adaptation_rate=G).decisive.recipe == pair.recipe
     refuted = judged_26(problem, bandwidth=w, adaptation_rate=G * Fraction("0.99"))
     assert refuted.verdict is Verdict.REFUTED
     assert [item.claim for item in refuted.shortfalls] == ["26c"]
     assert judged_26(problem, bandwidth=w / 2, adaptation_rate=G).verdict is Verdict.REFUTED
-    least = judged_distance(problem).least_adaptation.recipe
+    least = judged_distance(problem).at("least_adaptation").recipe
     same = judged_distance(problem, bandwidth=least.bandwidth, adaptation_rate=least.adaptation_rate)
     assert same.verdict is Verdict.CERTIFIED
-    assert same.asked.recipe == least
+    assert same.at("asked").recipe == least
     low = judged_distance(problem, bandwidth=least.bandwidth, adaptation_rate=least.adaptation_rate / 2)
     assert low.verdict is Verdict.REFUTED
     assert low.shortfalls[0].claim == "distance"
-    assert low.least_adaptation is not None
+    assert low.at("least_adaptation") is not None
 
 
 @pytest.mark.slow
 def test_a_gap_in_the_constants_leaves_gains_undecided():
     values = {k: (x, x * 1.01) if k == "lower" else (x * 0.99, x) for k, x in ALIVE.items()}
     problem = alive(values=values)
-    pair = judged_26(problem).pair.recipe
-    least = judged_distance(problem).least_adaptation.recipe
+    pair = judged_26(problem).decisive.recipe
+    least = judged_distance(problem).at("least_adaptation").recipe
     less = Fraction("0.97")
     asked = judged_26(problem, bandwidth=pair.bandwidth, adaptation_rate=pair.adaptation_rate * less)
     assert asked.verdict is Verdict.UNDECIDED
@@ -293,13 +301,13 @@ def test_one_gain_asked_for_leaves_the_other_to_the_search():
     problem = alive()
     only_rate = judged_26(problem, adaptation_rate=Fraction(10**7))
     assert only_rate.verdict is Verdict.CERTIFIED
-    smaller = only_rate.pair.recipe.bandwidth * Fraction("0.99")
+    smaller = only_rate.decisive.recipe.bandwidth * Fraction("0.99")
     assert judged_26(problem, bandwidth=smaller, adaptation_rate=Fraction(10**7)).verdict is Verdict.REFUTED
     assert judged_26(problem, adaptation_rate=Fraction(10)).verdict is Verdict.REFUTED
     assert judged_26(problem, bandwidth=Fraction("0.01")).verdict is Verdict.REFUTED
     b = judged_distance(problem, adaptation_rate=Fraction(10**6))
     assert b.verdict is Verdict.CERTIFIED
-    assert b.asked.recipe.bandwidth <= b.least_adaptation.recipe.bandwidth
+    assert b.at("asked").recipe.bandwidth <= b.at("least_adaptation").recipe.bandwidth
     assert judged_distance(problem, adaptation_rate=Fraction(1)).verdict is Verdict.REFUTED
     assert judged_distance(problem, bandwidth=Fraction("0.01")).verdict is Verdict.REFUTED
     assert judged_distance(problem, bandwidth=Fraction(200)).verdict is Verdict.CERTIFIED
@@ -314,7 +322,7 @@ def test_an_initial_distance_beyond_the_tube_is_refuted_by_name():
     result = judged_26(problem)
     assert result.verdict is Verdict.REFUTED
     assert result.shortfalls[0].claim == "26a"
-    assert result.pair is None
+    assert result.decisive is None
 
 
 def test_a_plan_defect_beyond_the_tube_is_refuted_by_name():
@@ -339,28 +347,28 @@ def test_results_are_json_and_recipes_are_decimals():
     result = judged_26(alive())
     data = to_json(result.data())
     assert data["predictor_gain"] == 3.5
-    assert Fraction(repr(data["bandwidth"])) == result.pair.recipe.bandwidth
-    recipe = to_json(judged_distance(alive()).least_adaptation.recipe)
+    assert Fraction(repr(data["bandwidth"])) == result.decisive.recipe.bandwidth
+    recipe = to_json(judged_distance(alive()).at("least_adaptation").recipe)
     again = theorem_b.DistanceRecipe(**{k: Fraction(repr(x)) for k, x in recipe.items()})
     assert margin_distance(alive(), again).lo > 0
-    recipe = judged_26(two_state(predictor_gain=None)).pair.recipe
+    recipe = judged_26(two_state(predictor_gain=None)).decisive.recipe
     assert RateRecipe(**{k: Fraction(repr(x)) for k, x in to_json(recipe).items()}) == recipe
 
 
 def test_elasticities_are_the_slopes_of_the_search():
     problem = alive()
     result = judged_distance(problem)
-    slopes = elasticities_distance(problem, result.least_adaptation.recipe)
+    slopes = elasticities_distance(problem, result.at("least_adaptation").recipe)
     n = problem.floats()
-    w = np.array([float(result.least_adaptation.recipe.bandwidth)])
+    w = np.array([float(result.at("least_adaptation").recipe.bandwidth)])
     for name in ("metric_input_gain", "h_t", "lower"):
         moved = alive(values={name: ALIVE[name] * 1.001})
         ratio = least_rate(moved, moved.floats(), w)[0] / least_rate(problem, n, w)[0]
         assert slopes[name] == pytest.approx(float(np.log(ratio[0]) / np.log(1.001)), rel=0.02)
     assert set(slopes) <= set(ALIVE)
-    assert elasticities_26(problem, judged_26(problem).least_adaptation.recipe)["B_pinv"] == pytest.approx(
-        2.0, abs=0.2
-    )
+    assert elasticities_26(problem, judged_26(problem).at("least_adaptation").recipe)[
+        "B_pinv"
+    ] == pytest.approx(2.0, abs=0.2)
 
 
 def random_problem(rng: np.random.Generator) -> TubeProblem:

@@ -87,7 +87,7 @@ def test_more_wind_never_needs_less():
     rates = []
     for bound in ("0", "0.01", "0.05", "0.1"):
         problem = two_state(wind=wind(bound, explained=0.05))
-        pair = judged_distance(problem).least_adaptation
+        pair = judged_distance(problem).at("least_adaptation")
         if judged_distance(problem).verdict is Verdict.CERTIFIED:
             rates.append(judged_distance(problem).decisive.recipe.adaptation_rate)
         assert pair is None or pair.recipe.adaptation_rate > 0

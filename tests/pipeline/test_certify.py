@@ -92,7 +92,7 @@ def test_gains_of_the_reference_rows():
     problem = captured_problem(declared(THREE))
     worst_start = dataclasses.replace(problem.constants, h_initial=problem.constants.h)
     row = dataclasses.replace(problem, constants=worst_start, predictor_gain=None)
-    a, b = judged_26(row).pair.recipe, judged_distance(row).least_adaptation.recipe
+    a, b = judged_26(row).decisive.recipe, judged_distance(row).at("least_adaptation").recipe
     assert float(b.bandwidth) == pytest.approx(10.8, rel=0.03)
     assert float(b.adaptation_rate) == pytest.approx(1.38e4, rel=0.1)
     assert 41.8 > a.bandwidth > b.bandwidth

@@ -23,7 +23,7 @@ from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.obstacles import obstacles, reach
 from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
-from tubecert.conditions.theorem import Theorem
+from tubecert.conditions.theorem import LoopGains, Theorem
 from tubecert.conditions.wind import drifting, felt, is_felt, prediction, provisos, pushed, taken
 from tubecert.enclosure.interval import Interval
 
@@ -31,13 +31,9 @@ _RISES = 200  # iterations towards the least fixed point from below; any number 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DistanceRecipe:
+class DistanceRecipe(LoopGains):
     """The proof of theorem B at printed gains: `speed` is Y, `prediction_error` e, `uncertainty` S."""
 
-    bandwidth: Fraction
-    adaptation_rate: Fraction
-    predictor_gain: Fraction
-    projection_radius: Fraction
     speed: Fraction
     prediction_error: Fraction
     uncertainty: Fraction

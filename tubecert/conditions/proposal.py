@@ -30,7 +30,8 @@ class Proposal(Generic[R]):
     `hopeless`: where there is none, one that stands for all that could still be chosen (a rate without bound): if it is
     refuted, so is what was asked for. `beside`: others by role. `companion`: a recipe of
     another theorem at the decisive gains, for their ultimate radius. `curve`: a trade-off; `around`: other bandwidths
-    at the decisive gains; each of them shares one projection radius.
+    at the decisive gains; each of them shares one projection radius. `infimum`: the least bandwidth that (26a), (26b)
+    admit, and which of them `binds` there.
     """
 
     decisive: R | None = None
@@ -40,15 +41,9 @@ class Proposal(Generic[R]):
     companion: Any = None
     curve: tuple[R, ...] = ()
     around: tuple[R, ...] = ()
+    infimum: float | None = None
+    binds: str | None = None
 
     def at(self, role: str) -> R | None:
         """The recipe in a role."""
         return self.decisive if role == self.role else self.beside.get(role)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RateProposal(Proposal[R]):
-    """Of certificate A: `infimum`, the least bandwidth that (26a), (26b) admit, and which of them `binds` there."""
-
-    infimum: float | None = None
-    binds: str | None = None

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
-from tubecert.conditions.theorem import Theorem
+from tubecert.conditions.theorem import LoopGains, Theorem
 from tubecert.conditions.verdict import Shortfall
 from tubecert.conditions.wind import not_covered, provisos
 from tubecert.enclosure.interval import Interval
@@ -35,13 +34,8 @@ Margins = dict[str, Interval]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RateRecipe:
+class RateRecipe(LoopGains):
     """Everything that the conditions (26) are checked at."""
-
-    bandwidth: Fraction
-    adaptation_rate: Fraction
-    predictor_gain: Fraction
-    projection_radius: Fraction
 
 
 @quiet

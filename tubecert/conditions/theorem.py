@@ -31,6 +31,21 @@ class Recipe(Protocol):
 R = TypeVar("R", bound=Recipe)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopGains:
+    """The gains of an adaptive loop: omega in rad/s, Gamma in 1/s^2, the g of A_m = -g I in 1/s, R_H."""
+
+    bandwidth: Fraction
+    adaptation_rate: Fraction
+    predictor_gain: Fraction
+    projection_radius: Fraction
+
+    @property
+    def gains(self) -> dict[str, Fraction]:
+        """The gains alone, by name."""
+        return {item.name: getattr(self, item.name) for item in fields(LoopGains)}
+
+
 def _nothing(problem: TubeProblem) -> tuple[Shortfall, ...]:
     del problem
     return ()

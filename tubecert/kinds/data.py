@@ -13,6 +13,7 @@ from fractions import Fraction
 from math import inf, isfinite
 from typing import ClassVar, Literal
 
+from tubecert.conditions.theorem import LoopGains
 from tubecert.conditions.verdict import Shortfall
 from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.enclosure.interval import Interval
@@ -44,6 +45,14 @@ class GainPoint:
     adaptation_rate: Fraction
     predictor_gain: Fraction
 
+    @classmethod
+    def along(cls, curve: Iterable[LoopGains]) -> tuple[GainPoint, ...]:
+        """Those of recipes."""
+        return tuple(
+            cls(bandwidth=r.bandwidth, adaptation_rate=r.adaptation_rate, predictor_gain=r.predictor_gain)
+            for r in curve
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Missing:
@@ -70,9 +79,9 @@ class SectionData(ABC):
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
         """Every set of gains that the section holds; the one that the verdict is about comes first."""
 
-    @abstractmethod
     def points(self) -> tuple[tuple[float, float], ...]:
-        """The proven curve: bandwidth, and what it is drawn against."""
+        """The proven curve: bandwidth and adaptation rate; a section that chooses nothing has none."""
+        return tuple((float(p.bandwidth), float(p.adaptation_rate)) for p in getattr(self, "curve", ()))
 
     def decisive(self, *, asked: bool) -> Pair | None:
         """The gains that the verdict is about."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Final
 
 from tubecert.conditions import distance
 from tubecert.conditions.distance import DistanceRecipe
-from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Proposal
+from tubecert.conditions.theorem import LoopGains
 from tubecert.enclosure.constant import Constant
-from tubecert.kernel import Checked, Judgement, judge
+from tubecert.kernel import Checked
 from tubecert.kinds import DISTANCE
 from tubecert.kinds.data import (
     GainPoint,
@@ -25,13 +25,9 @@ from tubecert.kinds.kind import Kind, Section
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DistancePair:
+class DistancePair(LoopGains):
     """Gains of certificate B with their margin."""
 
-    bandwidth: Fraction
-    adaptation_rate: Fraction
-    predictor_gain: Fraction
-    projection_radius: Fraction
     margin: Constant
     ultimate_radius: float | None
 
@@ -75,83 +71,34 @@ class DistanceData(SectionData):
         )
         return tuple(pair.pair(role) for role, pair in roles if pair is not None)
 
-    def points(self) -> tuple[tuple[float, float], ...]:
-        """Bandwidth and adaptation rate."""
-        return tuple((float(p.bandwidth), float(p.adaptation_rate)) for p in self.curve)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DistanceSection(Section[DistanceRecipe]):
-    """The pair of least bandwidth, the pair of least rate, the pair asked for (which then decides), the curve."""
-
-    name = DISTANCE
-
-    @property
-    def split(self) -> Checked[DistanceRecipe] | None:
-        """The gains of least bandwidth."""
-        return self.at("split")
-
-    @property
-    def least_adaptation(self) -> Checked[DistanceRecipe] | None:
-        """The gains of least adaptation rate."""
-        return self.at("least_adaptation")
-
-    @property
-    def asked(self) -> Checked[DistanceRecipe] | None:
-        """The gains asked for."""
-        return self.at("asked")
-
-    def data(self) -> DistanceData:
-        """The section `distance` of the certificate."""
-        judgement = self.judgement
-        return DistanceData(
-            verdict=self.verdict,
-            split=_pair_data(self.at("split")),
-            least_adaptation=_pair_data(self.at("least_adaptation")),
-            asked=_pair_data(self.at("asked")),
-            ultimate_radius=judgement.ultimate_radius,
-            curve=tuple(
-                GainPoint(
-                    bandwidth=r.bandwidth, adaptation_rate=r.adaptation_rate, predictor_gain=r.predictor_gain
-                )
-                for r in self.curve
-            ),
-            shortfalls=missing_data(self.shortfalls),
-            margins_around=None if not judgement.around_at else _around_data(judgement),
-        )
+def _data(section: Section[DistanceRecipe]) -> DistanceData:
+    judgement = section.judgement
+    recipes = judgement.around_at
+    return DistanceData(
+        verdict=section.verdict,
+        split=_pair_data(section.at("split")),
+        least_adaptation=_pair_data(section.at("least_adaptation")),
+        asked=_pair_data(section.at("asked")),
+        ultimate_radius=judgement.ultimate_radius,
+        curve=GainPoint.along(section.curve),
+        shortfalls=missing_data(section.shortfalls),
+        margins_around=None
+        if not recipes
+        else DistanceAround(
+            bandwidth=tuple(recipe.bandwidth for recipe in recipes),
+            adaptation_rate=recipes[0].adaptation_rate,
+            predictor_gain=recipes[0].predictor_gain,
+            margin=proven_data(judgement.around[DISTANCE.key]),
+        ),
+    )
 
 
 def _pair_data(pair: Checked[DistanceRecipe] | None) -> DistancePair | None:
     if pair is None:
         return None
-    recipe = pair.recipe
-    return DistancePair(
-        bandwidth=recipe.bandwidth,
-        adaptation_rate=recipe.adaptation_rate,
-        predictor_gain=recipe.predictor_gain,
-        projection_radius=recipe.projection_radius,
-        margin=margin_data(pair.margins["distance"]),
-        ultimate_radius=pair.ultimate_radius,
-    )
+    margin = margin_data(pair.margins[DISTANCE.key])
+    return DistancePair(**pair.recipe.gains, margin=margin, ultimate_radius=pair.ultimate_radius)
 
 
-def _around_data(judgement: Judgement[DistanceRecipe]) -> DistanceAround:
-    recipes = judgement.around_at
-    return DistanceAround(
-        bandwidth=tuple(recipe.bandwidth for recipe in recipes),
-        adaptation_rate=recipes[0].adaptation_rate,
-        predictor_gain=recipes[0].predictor_gain,
-        margin=proven_data(judgement.around["distance"]),
-    )
-
-
-class Distance(Kind[DistanceRecipe]):
-    """Certificate B."""
-
-    name = DISTANCE
-    theorem = distance.THEOREM
-    form = DistanceData
-
-    def section(self, problem: TubeProblem, proposal: Proposal[DistanceRecipe]) -> DistanceSection:
-        """The section about a proposal."""
-        return DistanceSection(judgement=judge(problem, self.theorem, proposal))
+KIND: Final = Kind(name=DISTANCE, theorem=distance.THEOREM, form=DistanceData, data=_data)

@@ -1,12 +1,11 @@
-"""What a kind of certificate has to offer, and what all their sections have in common."""
+"""What a kind of certificate has to offer, and its section: what the kernel decided about it."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar, Generic
+from typing import Generic
 
 from tubecert.claims.gains import GainsSuffice
 from tubecert.conditions.inputs import InputBound, LimitedInput
@@ -15,17 +14,24 @@ from tubecert.conditions.proposal import Proposal
 from tubecert.conditions.theorem import R, Theorem
 from tubecert.conditions.verdict import Shortfall, Verdict
 from tubecert.enclosure.constant import Constant
-from tubecert.kernel import Checked, Judgement, Proof
+from tubecert.kernel import Checked, Judgement, Proof, judge
 from tubecert.kinds import Name
 from tubecert.kinds.data import SectionData
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Section(ABC, Generic[R]):
-    """What the kernel decided about one kind, as a section of the certificate."""
+class Section(Generic[R]):
+    """What the kernel decided about one kind over a problem, from what was proposed."""
 
-    name: ClassVar[Name]
+    kind: Kind[R]
+    problem: TubeProblem
+    proposal: Proposal[R]
     judgement: Judgement[R]
+
+    @property
+    def name(self) -> Name:
+        """How its kind is called."""
+        return self.kind.name
 
     @property
     def verdict(self) -> Verdict:
@@ -66,34 +72,43 @@ class Section(ABC, Generic[R]):
         return self.judgement.curve
 
     def claim(self) -> GainsSuffice:
-        """That the decisive gains suffice, with what is proven to be left."""
+        """That the decisive gains suffice, with what is proven to be left, and which condition sets the bandwidth."""
         margins = {} if self.decisive is None else self.decisive.margins
         return GainsSuffice(
-            section=self.name.key, margins={condition: float(m.lo) for condition, m in margins.items()}
+            section=self.name.key,
+            margins={condition: float(m.lo) for condition, m in margins.items()},
+            binds=self.proposal.binds,
         )
 
-    @abstractmethod
     def data(self) -> SectionData:
         """The section, as the certificate holds it."""
+        return self.kind.data(self)
+
+    def derived(self) -> Mapping[str, Constant]:
+        """Constants at the decisive gains that the certificate lists beside those of the tube."""
+        own = self.kind.constants
+        return {} if own is None or self.decisive is None else own(self.problem, self.decisive.recipe)
 
 
-class Kind(ABC, Generic[R]):
-    """One kind of certificate; `form` is how its section is read."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind(Generic[R]):
+    """One kind of certificate: its theorem, and its section as data, of the type `form`.
 
-    name: ClassVar[Name]
+    `constants`: those at the decisive gains, if the kind has any.
+    """
+
+    name: Name
     theorem: Theorem[R]
     form: type[SectionData]
+    data: Callable[[Section[R]], SectionData]
+    constants: Callable[[TubeProblem, R], Mapping[str, Constant]] | None = None
 
     @property
     def key(self) -> str:
         """The name of its section in a certificate."""
         return self.name.key
 
-    @abstractmethod
     def section(self, problem: TubeProblem, proposal: Proposal[R]) -> Section[R]:
         """The section about what a search proposes."""
-
-    def derived(self, section: Section[R]) -> Mapping[str, Constant]:
-        """Constants at the decisive gains that the certificate lists beside those of the tube."""
-        del section
-        return {}
+        judgement = judge(problem, self.theorem, proposal)
+        return Section(kind=self, problem=problem, proposal=proposal, judgement=judgement)

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Final
 
-from tubecert.claims.gains import GainsSuffice
 from tubecert.conditions import rates
-from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Proposal, RateProposal
 from tubecert.conditions.rates import RateRecipe
+from tubecert.conditions.theorem import LoopGains
 from tubecert.enclosure.constant import Constant
-from tubecert.kernel import Checked, Judgement, judge
+from tubecert.kernel import Checked
 from tubecert.kinds import RATES
 from tubecert.kinds.data import (
     GainPoint,
     Pair,
+    Role,
     SectionData,
     margin_data,
     missing_data,
@@ -29,13 +29,9 @@ CONDITIONS = ("26a", "26b", "26c")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RatePair:
+class RatePair(LoopGains):
     """Gains of certificate A with the margins of its conditions."""
 
-    bandwidth: Fraction
-    adaptation_rate: Fraction
-    predictor_gain: Fraction
-    projection_radius: Fraction
     margins: Mapping[str, Constant]
 
 
@@ -73,124 +69,61 @@ class RatesData(SectionData):
 
     def pairs(self, *, asked: bool) -> tuple[Pair, ...]:
         """The gains of least bandwidth, or asked for; and where none were, those of least adaptation rate."""
-        found = []
-        if self.bandwidth is not None:
-            found.append(
-                Pair(
-                    role="asked" if asked else "least_bandwidth",
-                    bandwidth=self.bandwidth,
-                    adaptation_rate=self.adaptation_rate,
-                    margins=self.margins or {},
-                )
+        roles: tuple[tuple[Role, RatesData | RatePair | None], ...] = (
+            ("asked" if asked else "least_bandwidth", None if self.bandwidth is None else self),
+            ("least_adaptation", None if asked else self.least_adaptation),
+        )
+        return tuple(
+            Pair(
+                role=role,
+                bandwidth=pair.bandwidth,
+                adaptation_rate=pair.adaptation_rate,
+                margins=pair.margins or {},
             )
-        least = self.least_adaptation
-        if least is not None and not asked:
-            found.append(
-                Pair(
-                    role="least_adaptation",
-                    bandwidth=least.bandwidth,
-                    adaptation_rate=least.adaptation_rate,
-                    margins=least.margins,
-                )
-            )
-        return tuple(found)
-
-    def points(self) -> tuple[tuple[float, float], ...]:
-        """Bandwidth and adaptation rate."""
-        return tuple((float(p.bandwidth), float(p.adaptation_rate)) for p in self.curve)
+            for role, pair in roles
+            if pair is not None
+        )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RatesSection(Section[RateRecipe]):
+def _data(section: Section[RateRecipe]) -> RatesData:
     """The pair of least bandwidth (or asked for), the pair of least rate, the curve.
 
-    `infimum` is the smallest bandwidth that (26a), (26b) admit; where (26b) binds it is not attained, and the pair has
-    the smallest bandwidth that leaves 1 % of (26b). `binds` names the condition that sets the bandwidth.
+    The infimum is the smallest bandwidth that (26a), (26b) admit; where (26b) binds it is not attained, and the pair
+    has the smallest bandwidth that leaves 1 % of (26b).
     """
-
-    name = RATES
-
-    problem: TubeProblem
-    infimum: float | None
-    binds: str | None
-
-    @property
-    def pair(self) -> Checked[RateRecipe] | None:
-        """The gains that the verdict is about."""
-        return self.decisive
-
-    @property
-    def least_adaptation(self) -> Checked[RateRecipe] | None:
-        """The gains of least adaptation rate."""
-        return self.at("least_adaptation")
-
-    def claim(self) -> GainsSuffice:
-        """That the gains suffice, and which condition sets the bandwidth."""
-        return replace(Section.claim(self), binds=self.binds)
-
-    def data(self) -> RatesData:
-        """The section `conditions_26` of the certificate."""
-        at, judgement = _pair_data(self.pair), self.judgement
-        return RatesData(
-            verdict=self.verdict,
-            bandwidth=None if at is None else at.bandwidth,
-            adaptation_rate=None if at is None else at.adaptation_rate,
-            predictor_gain=None if at is None else at.predictor_gain,
-            projection_radius=None if at is None else at.projection_radius,
-            margins=None if at is None else at.margins,
-            ultimate_radius=judgement.ultimate_radius,
-            least_adaptation=_pair_data(self.least_adaptation),
-            curve=tuple(
-                GainPoint(
-                    bandwidth=r.bandwidth, adaptation_rate=r.adaptation_rate, predictor_gain=r.predictor_gain
-                )
-                for r in self.curve
-            ),
-            bandwidth_infimum=self.infimum,
-            binds=self.binds,
-            shortfalls=missing_data(self.shortfalls),
-            margins_around=_around_data(judgement) if judgement.around_at else None,
-        )
+    at, judgement, proposal = _pair_data(section.decisive), section.judgement, section.proposal
+    recipes = judgement.around_at
+    return RatesData(
+        verdict=section.verdict,
+        bandwidth=None if at is None else at.bandwidth,
+        adaptation_rate=None if at is None else at.adaptation_rate,
+        predictor_gain=None if at is None else at.predictor_gain,
+        projection_radius=None if at is None else at.projection_radius,
+        margins=None if at is None else at.margins,
+        ultimate_radius=judgement.ultimate_radius,
+        least_adaptation=_pair_data(section.at("least_adaptation")),
+        curve=GainPoint.along(section.curve),
+        bandwidth_infimum=proposal.infimum,
+        binds=proposal.binds,
+        shortfalls=missing_data(section.shortfalls),
+        margins_around=None
+        if not recipes
+        else RatesAround(
+            bandwidth=tuple(recipe.bandwidth for recipe in recipes),
+            adaptation_rate=recipes[0].adaptation_rate,
+            predictor_gain=recipes[0].predictor_gain,
+            margins={condition: proven_data(low) for condition, low in judgement.around.items()},
+        ),
+    )
 
 
 def _pair_data(pair: Checked[RateRecipe] | None) -> RatePair | None:
     if pair is None:
         return None
-    recipe = pair.recipe
-    return RatePair(
-        bandwidth=recipe.bandwidth,
-        adaptation_rate=recipe.adaptation_rate,
-        predictor_gain=recipe.predictor_gain,
-        projection_radius=recipe.projection_radius,
-        margins={condition: margin_data(margin) for condition, margin in pair.margins.items()},
-    )
+    margins = {condition: margin_data(margin) for condition, margin in pair.margins.items()}
+    return RatePair(**pair.recipe.gains, margins=margins)
 
 
-def _around_data(judgement: Judgement[RateRecipe]) -> RatesAround:
-    recipes = judgement.around_at
-    return RatesAround(
-        bandwidth=tuple(recipe.bandwidth for recipe in recipes),
-        adaptation_rate=recipes[0].adaptation_rate,
-        predictor_gain=recipes[0].predictor_gain,
-        margins={condition: proven_data(low) for condition, low in judgement.around.items()},
-    )
-
-
-class Rates(Kind[RateRecipe]):
-    """Certificate A."""
-
-    name = RATES
-    theorem = rates.THEOREM
-    form = RatesData
-
-    def section(self, problem: TubeProblem, proposal: Proposal[RateRecipe]) -> RatesSection:
-        """The section about a proposal."""
-        met = proposal if isinstance(proposal, RateProposal) else RateProposal()
-        judgement = judge(problem, self.theorem, proposal)
-        return RatesSection(judgement=judgement, problem=problem, infimum=met.infimum, binds=met.binds)
-
-    def derived(self, section: Section[RateRecipe]) -> Mapping[str, Constant]:
-        """The derived constants of (26a)-(26c) at the pair."""
-        if not isinstance(section, RatesSection) or section.pair is None:
-            return {}
-        return rates.derived_constants(section.problem, section.pair.recipe)
+KIND: Final = Kind(
+    name=RATES, theorem=rates.THEOREM, form=RatesData, data=_data, constants=rates.derived_constants
+)

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any, Final
 
 from tubecert.conditions.problem import TubeProblem
-from tubecert.kinds import name_of
-from tubecert.kinds.alone import Alone
-from tubecert.kinds.distance import Distance
+from tubecert.kinds import alone, distance, name_of, rates
 from tubecert.kinds.kind import Kind
-from tubecert.kinds.rates import Rates
 
 AnyKind = Kind[Any]
 
-KINDS: Final[tuple[AnyKind, ...]] = (Alone(), Rates(), Distance())
+KINDS: Final[tuple[AnyKind, ...]] = (alone.KIND, rates.KIND, distance.KIND)
 
 
 def kind_of(word: str) -> AnyKind:

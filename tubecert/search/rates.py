@@ -17,7 +17,7 @@ from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.derived import zetas
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked, RateProposal
+from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.rates import RateRecipe, theta
 from tubecert.search import distance
 from tubecert.search.bandwidths import Bandwidth, RateSearch, bandwidth, bandwidths_around
@@ -130,10 +130,10 @@ def _asked_recipe(
     return recipe_at(s, round_up((at if np.isfinite(at) else least) * (1 + _SLACK), DIGITS), Gamma)
 
 
-def propose_rates(problem: TubeProblem, asked: Asked) -> RateProposal[RateRecipe]:
+def propose_rates(problem: TubeProblem, asked: Asked) -> Proposal[RateRecipe]:
     """The smallest bandwidth and its rate, or the gains asked for, with the pair of least Gamma and the curve."""
     if theorem_a.THEOREM.unbounded(problem):
-        return RateProposal()
+        return Proposal()
     s = RateSearch.of(problem)
     found, whole = bandwidth(s, SHARE_LEFT), bandwidth(s, 0.0)
     hopeless = None
@@ -145,7 +145,7 @@ def propose_rates(problem: TubeProblem, asked: Asked) -> RateProposal[RateRecipe
             # (26b) leaves nothing for any rate: the bandwidth alone is to be judged
             hopeless = recipe_at(s, asked.bandwidth, Fraction(10) ** 100)
     least = least_recipe(s, found)
-    return RateProposal(
+    return Proposal(
         decisive=recipe,
         role="pair",
         hopeless=hopeless,

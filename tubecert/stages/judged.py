@@ -64,7 +64,7 @@ class Judged:
         return {
             name: (value.printable(), DERIVED[name])
             for kind in KINDS
-            for name, value in kind.derived(self.sections[kind.key]).items()
+            for name, value in self.sections[kind.key].derived().items()
         }
 
 
