@@ -10,7 +10,6 @@ from problems import alive, judged_26, judged_distance, two_state
 
 from tubecert.bounds.constants import Constant, ResidualConstants, WindConstants
 from tubecert.conditions import distance
-from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.conditions.proposal import Asked
 from tubecert.conditions.wind import prediction
@@ -51,8 +50,7 @@ def test_v_falls_wherever_it_exceeds_the_bound(zb, s1, Gamma, q, at):
     y, s = at
     n = two_state().floats()
     hs = float(n.Dh + n.R)
-    p = Predictor(norm=np.asarray(q / 2), shifted=np.asarray(1.0), q=np.asarray(q))
-    Xt = float(prediction(n, np.asarray(s1), p, np.asarray(Gamma), np.asarray(zb)))
+    Xt = float(prediction(n, np.asarray(s1), np.asarray(q / 2), np.asarray(Gamma), np.asarray(zb)))
     V = y**2 + (s * hs) ** 2 / Gamma
     if Xt**2 * (1 + 1e-9) < V:
         assert -q * y**2 + 2 * zb * y + 2 * s * hs * s1 / Gamma <= 1e-9 * q * y**2
@@ -62,8 +60,7 @@ def test_the_bound_of_the_prediction_is_attained():
     """At Xt, with s~ as large as it may be, V' vanishes: no smaller number would do for this argument."""
     n = two_state().floats()
     zb, s1, Gamma, q = 0.3, 4.0, 1e4, 20.0
-    p = Predictor(norm=np.asarray(q / 2), shifted=np.asarray(1.0), q=np.asarray(q))
-    Xt = float(prediction(n, np.asarray(s1), p, np.asarray(Gamma), np.asarray(zb)))
+    Xt = float(prediction(n, np.asarray(s1), np.asarray(q / 2), np.asarray(Gamma), np.asarray(zb)))
     hs = float(n.Dh + n.R)
     y = np.sqrt(Xt**2 - hs**2 / Gamma)
     assert -q * y**2 + 2 * zb * y + 2 * hs * s1 / Gamma == pytest.approx(0, abs=1e-9)
@@ -77,7 +74,7 @@ def test_the_least_rate_is_one_at_which_e_is_what_it_has_to_be(problem):
     omega = np.array([60.0])
     Gamma, e = least_rate(problem, n, omega, omega)
     Y = distance.least_speed(n, omega, e)
-    needed = distance.error_needed(n, Y, omega, Predictor.of_gain(omega, omega), Gamma)
+    needed = distance.error_needed(n, Y, omega, omega, Gamma)
     assert np.isfinite(Gamma[0])
     assert needed[0] == pytest.approx(e[0], rel=1e-9)
 

@@ -12,19 +12,35 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Generic
 
 import numpy as np
 
-from tubecert.conditions.arithmetic import Array, T, least_solution, maximum, minimum, quiet, sqrt, vector
-from tubecert.conditions.derived import prediction_error
+from tubecert.conditions.arithmetic import (
+    Array,
+    T,
+    absolute,
+    least_solution,
+    maximum,
+    minimum,
+    quiet,
+    sqrt,
+    vector,
+)
 from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.kernels import DistanceBound
 from tubecert.conditions.obstacles import obstacles, reach
-from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import LoopGains, Theorem
-from tubecert.conditions.wind import drifting, felt, is_felt, prediction, provisos, pushed, taken
+from tubecert.conditions.wind import (
+    drifting,
+    felt,
+    is_felt,
+    prediction,
+    prediction_error,
+    provisos,
+    pushed,
+    taken,
+)
 from tubecert.enclosure.interval import Interval
 
 _RISES = 200  # iterations towards the least fixed point from below; any number of them is sound
@@ -37,15 +53,6 @@ class DistanceRecipe(LoopGains):
     speed: Fraction
     prediction_error: Fraction
     uncertainty: Fraction
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DistanceState(Generic[T]):
-    """Y, e and S of theorem B in one arithmetic."""
-
-    Y: T
-    e: T
-    S: T
 
 
 @quiet
@@ -76,19 +83,24 @@ def uncertainty(n: Numbers[T], Y: T, omega: T) -> T:
 
 
 @quiet
-def filter_error(n: Numbers[T], Y: T, omega: T, p: Predictor[T]) -> T:
-    """Deta of certificate B: (DBpx Y + DBp (omega + |A_m + omega I|)) Dxt, (2.12)."""
-    gain = n.DBpx * Y + n.DBp * (omega + p.shifted)
-    return gain * prediction_error(n.Dh + n.R, n.Dht + n.Dhx * Y, p.q)
+def filter_error(n: Numbers[T], Y: T, omega: T, g: T) -> T:
+    """Deta of certificate B: (DBpx Y + DBp (omega + |A_m + omega I|)) Dxt with A_m = -g I, (2.12)."""
+    return estimation_gain(n, Y, omega, g) * prediction_error(n.Dh + n.R, n.Dht + n.Dhx * Y, g)
 
 
 @quiet
-def error_needed(n: Numbers[T], Y: T, omega: T, p: Predictor[T], Gamma: T) -> T:
+def estimation_gain(n: Numbers[T], Y: T, omega: T, g: T) -> T:
+    """What an estimate is off per |xt|: DBpx Y + DBp (omega + |omega - g|), (2.12)."""
+    return n.DBpx * Y + n.DBp * (omega + absolute(omega - g))
+
+
+@quiet
+def error_needed(n: Numbers[T], Y: T, omega: T, g: T, Gamma: T) -> T:
     """What e has to be at least: Deta/sqrt(Gamma), (4.2); with what is no input (7.9)."""
     if not is_felt(n):
-        return filter_error(n, Y, omega, p) / sqrt(Gamma)
-    xt = prediction(n, n.Dht + n.Dhx * Y, p, Gamma, felt(n))
-    return (n.DBpx * Y + n.DBp * (omega + p.shifted)) * xt + taken(n)
+        return filter_error(n, Y, omega, g) / sqrt(Gamma)
+    xt = prediction(n, n.Dht + n.Dhx * Y, g, Gamma, felt(n))
+    return estimation_gain(n, Y, omega, g) * xt + taken(n)
 
 
 def distance_bound(n: Numbers[T], omega: T, S: T, e: T) -> DistanceBound[T]:
@@ -104,35 +116,24 @@ def margin_distance_along(problem: TubeProblem, recipes: Sequence[DistanceRecipe
     R_H = recipes[0].projection_radius
     serves = all(r.projection_radius == R_H for r in recipes) and problem.radius_serves(R_H)
     omega, Gamma = vector([r.bandwidth for r in recipes]), vector([r.adaptation_rate for r in recipes])
-    state = DistanceState(
-        Y=vector([r.speed for r in recipes]),
-        e=vector([r.prediction_error for r in recipes]),
-        S=vector([r.uncertainty for r in recipes]),
+    Y, e, S = (
+        vector([getattr(r, name) for r in recipes]) for name in ("speed", "prediction_error", "uncertainty")
     )
-    p = Predictor.of_gain(vector([r.predictor_gain for r in recipes]), omega)
+    g = vector([r.predictor_gain for r in recipes])
     n = problem.proven(R_H)
-    valid = serves & _is_valid(n, omega, Gamma, p, state)
-    low = _margin(n, omega, state).lo
-    high = _margin(problem.enclosed(R_H), omega, state).hi
-    return Interval(np.where(valid, low, -np.inf), np.maximum(low, high))
-
-
-def _is_valid(
-    n: Numbers[Interval], omega: Interval, Gamma: Interval, p: Predictor[Interval], s: DistanceState[Interval]
-) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """The side conditions of theorem B on Y, e and S, proven."""
-    speed = speed_needed(n, s.S, s.e).hi < s.Y.lo  # (4.3)
+    filtered = uncertainty(n, Y, omega).hi <= S.lo  # (4.1)
     if is_felt(n):
-        predicted = error_needed(n, s.Y, omega, p, Gamma).hi <= s.e.lo  # (7.9)
+        predicted = error_needed(n, Y, omega, g, Gamma).hi <= e.lo  # (7.9)
     else:
-        predicted = filter_error(n, s.Y, omega, p).hi <= (s.e * sqrt(Gamma)).lo  # (4.2)
-    filtered = uncertainty(n, s.Y, omega).hi <= s.S.lo  # (4.1)
-    return speed & predicted & filtered
+        predicted = filter_error(n, Y, omega, g).hi <= (e * sqrt(Gamma)).lo  # (4.2)
+    fast = speed_needed(n, S, e).hi < Y.lo  # (4.3)
+    low, high = _margin(n, omega, S, e).lo, _margin(problem.enclosed(R_H), omega, S, e).hi
+    return Interval(np.where(serves & filtered & predicted & fast, low, -np.inf), np.maximum(low, high))
 
 
-def _margin(n: Numbers[Interval], omega: Interval, s: DistanceState[Interval]) -> Interval:
+def _margin(n: Numbers[Interval], omega: Interval, S: Interval, e: Interval) -> Interval:
     """1 - sup D/dbar, (4.4)."""
-    return (1 - distance_bound(n, omega, s.S, s.e).supremum() / reach(n)).sanitised()
+    return (1 - distance_bound(n, omega, S, e).supremum() / reach(n)).sanitised()
 
 
 @quiet
@@ -145,16 +146,16 @@ def distance_ceiling(problem: TubeProblem, recipe: DistanceRecipe) -> float:
     """
     n = problem.enclosed(recipe.projection_radius)
     omega, Gamma = Interval.of(recipe.bandwidth), Interval.of(recipe.adaptation_rate)
-    p = Predictor.of_gain(Interval.of(recipe.predictor_gain), omega)
+    g = Interval.of(recipe.predictor_gain)
 
     def errors(Y: Interval) -> tuple[Interval, Interval]:
         S = uncertainty(n, Y, omega).sanitised()
-        e = error_needed(n, Y, omega, p, Gamma).sanitised()
+        e = error_needed(n, Y, omega, g, Gamma).sanitised()
         return Interval.exact(np.maximum(S.lo, 0.0)), Interval.exact(np.maximum(e.lo, 0.0))
 
     Y = least_from_below(lambda Y: speed_needed(n, *errors(Y)))
     S, e = errors(Y)
-    return float((1 - distance_bound(n, omega, S, e).supremum() / reach(n)).sanitised().hi)
+    return float(_margin(n, omega, S, e).hi)
 
 
 def least_from_below(needed: Callable[[Interval], Interval]) -> Interval:
@@ -171,27 +172,32 @@ def least_from_below(needed: Callable[[Interval], Interval]) -> Interval:
     return Y
 
 
-def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float | None:
-    """A1/sqrt(a): |x - x*| is at most this in the long run, proven, theory 4.3."""
+def _proven(
+    problem: TubeProblem, recipe: DistanceRecipe
+) -> tuple[Numbers[Interval], DistanceBound[Interval]]:
+    """D(t) of a recipe that is proven, with the numbers on their safe side."""
     n = problem.proven(recipe.projection_radius)
     S, e = Interval.of(recipe.uncertainty), Interval.of(recipe.prediction_error)
-    return float((distance_bound(n, Interval.of(recipe.bandwidth), S, e).ultimate() / sqrt(n.a)).hi)
+    return n, distance_bound(n, Interval.of(recipe.bandwidth), S, e)
+
+
+def ultimate_radius(problem: TubeProblem, recipe: DistanceRecipe) -> float | None:
+    """A1/sqrt(a): |x - x*| is at most this in the long run, proven, theory 4.3."""
+    n, bound = _proven(problem, recipe)
+    return float((bound.ultimate() / sqrt(n.a)).hi)
 
 
 def input_shares(problem: TubeProblem, recipe: DistanceRecipe) -> InputShares | None:
     """|k| <= du sup D, |u_a| <= R_H, (4.13)."""
-    n = problem.proven(recipe.projection_radius)
-    S, e = Interval.of(recipe.uncertainty), Interval.of(recipe.prediction_error)
-    top = distance_bound(n, Interval.of(recipe.bandwidth), S, e).supremum()
-    return shares(n, top, recipe.projection_radius)
+    n, bound = _proven(problem, recipe)
+    return shares(n, bound.supremum(), recipe.projection_radius)
 
 
 def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
     """Everything that theorem B compares, at some gains."""
     one = np.asarray(1.0)
-    p = Predictor.of_gain(one, one)
     S = uncertainty(n, least_speed(n, one, one), one)
-    return filter_error(n, one, one, p), distance_bound(n, one, S, one).supremum() < reach(n)
+    return filter_error(n, one, one, one), distance_bound(n, one, S, one).supremum() < reach(n)
 
 
 THEOREM = Theorem(

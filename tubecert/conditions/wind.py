@@ -1,12 +1,13 @@
-"""What a wind adds to theorems 0 and B: to the push on the distance, to |xdot|, to the estimate. Trusted.
+"""The estimate of the predictor A_m = -g I, P = I, and what a wind adds to theorems 0 and B. Trusted.
 
-Without a wind every function here gives back what it was given, digit by digit. Implements: theory section 7.
+A general A_m would serve no better: with g = lmin(Q)/2 and its unit eigenvector v, v'A_m v = -g, so |A_m| >= g and
+|A_m + omega I| >= |omega - g|, and -g I has the same q = 2 g, theory section 3. Without a wind every function of one
+gives back what it was given, digit by digit. Implements: theory section 7.
 """
 
 from __future__ import annotations
 
-from tubecert.conditions.arithmetic import T, number, sqrt
-from tubecert.conditions.predictor import Predictor
+from tubecert.conditions.arithmetic import T, number, quiet, sqrt
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.verdict import UNKNOWN, Shortfall
 
@@ -48,11 +49,17 @@ def felt(n: Numbers[T]) -> T:
     return number(0, n.d0) if found is None else found
 
 
-def prediction(n: Numbers[T], s1: T, p: Predictor[T], Gamma: T, zb: T) -> T:
+@quiet
+def prediction_error(hs: T, s1: T, g: T) -> T:
+    """Dxt = sqrt(2 (1+r_H) Dh s1/q + ((1+r_H) Dh)^2), q = 2 g: |xhat - x| <= Dxt/sqrt(Gamma), for P = I, (2.11)."""
+    return sqrt(2 * hs * s1 / (2 * g) + hs**2)
+
+
+def prediction(n: Numbers[T], s1: T, g: T, Gamma: T, zb: T) -> T:
     """The bound of |xt| of (7.8): not only what adaptation leaves, but what is no input."""
-    hs = n.Dh + n.R
-    drag = zb / p.q
-    return sqrt(hs**2 / Gamma + (drag + sqrt(drag**2 + 2 * hs * s1 / (p.q * Gamma))) ** 2)
+    hs, q = n.Dh + n.R, 2 * g
+    drag = zb / q
+    return sqrt(hs**2 / Gamma + (drag + sqrt(drag**2 + 2 * hs * s1 / (q * Gamma))) ** 2)
 
 
 def provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:

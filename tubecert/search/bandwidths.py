@@ -9,8 +9,8 @@ import numpy as np
 
 from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import round_up
-from tubecert.conditions.derived import RateTerms, rate_terms, zetas
 from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.rates import RateTerms, rate_terms, zetas
 from tubecert.search.scan import smallest
 
 _POINTS, _DIGITS = 41, 4  # of the bandwidths around one
@@ -54,8 +54,8 @@ def _least(s: RateSearch, claim: str, share_left: float) -> float:
         return float("inf")
 
     def holds(omega: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        z = zetas(n, terms, omega)
-        return (z.zeta1 if claim == "26a" else z.zeta2 + z.zeta3) <= allowed
+        zeta1, zeta2, zeta3 = zetas(n, terms, omega)
+        return (zeta1 if claim == "26a" else zeta2 + zeta3) <= allowed
 
     floor = _LOWEST * float(n.lam)
     # the kernel is at most Dh/omega + s1/(2 lambda omega)

@@ -17,7 +17,6 @@ from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.obstacles import reach
-from tubecert.conditions.predictor import Predictor
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.wind import felt, is_felt, pushed, taken
@@ -40,11 +39,6 @@ def best_gain(n: Numbers[Array], omega: Array, Y: Array) -> Array:
     return np.fmax(omega, (np.sqrt(r * (r + 8.0 * k)) - r) / 4.0)
 
 
-def _predictor(problem: TubeProblem, n: Numbers[Array], omega: Array, Y: Array) -> Predictor[Array]:
-    g = problem.predictor_gain
-    return Predictor.of_gain(best_gain(n, omega, Y) if g is None else np.asarray(float(g)), omega)
-
-
 @quiet
 def least_rate(
     problem: TubeProblem, n: Numbers[Array], omega: Array, gain: Array | None = None
@@ -55,6 +49,9 @@ def least_rate(
         Y = theorem_b.least_speed(n, omega, e)
         return theorem_b.distance_bound(n, omega, theorem_b.uncertainty(n, Y, omega), e).supremum() < reach(n)
 
+    given = gain
+    if given is None and problem.predictor_gain is not None:
+        given = np.asarray(float(problem.predictor_gain))
     most = np.broadcast_to((reach(n) * n.lam - pushed(n)) / n.beta, omega.shape)
     zero = np.zeros_like(omega)
     feasible = (most > 0) & inside(zero)
@@ -62,10 +59,10 @@ def least_rate(
 
     def rate(e: Array) -> Array:
         Y = theorem_b.least_speed(n, omega, e)
-        p = _predictor(problem, n, omega, Y) if gain is None else Predictor.of_gain(gain, omega)
+        g = best_gain(n, omega, Y) if given is None else given
         if is_felt(n):
-            return np.where(feasible & (e > 0), _rate_beside(n, omega, Y, p, e), np.inf)
-        return np.where(feasible & (e > 0), (theorem_b.filter_error(n, Y, omega, p) / e) ** 2, np.inf)
+            return np.where(feasible & (e > 0), _rate_beside(n, omega, Y, g, e), np.inf)
+        return np.where(feasible & (e > 0), (theorem_b.filter_error(n, Y, omega, g) / e) ** 2, np.inf)
 
     if not np.any(n.DBpx > 0):
         return rate(e_max), e_max
@@ -73,11 +70,11 @@ def least_rate(
     return minimum_lanes(rate, np.maximum(1e-4 * e_max, 1e-300), np.maximum(e_max, 1e-300))
 
 
-def _rate_beside(n: Numbers[Array], omega: Array, Y: Array, p: Predictor[Array], e: Array) -> Array:
+def _rate_beside(n: Numbers[Array], omega: Array, Y: Array, g: Array, e: Array) -> Array:
     """The Gamma for which (7.9) gives e, infinite where none does: a quadratic equation for 1/Gamma."""
-    room = (e - taken(n)) / (n.DBpx * Y + n.DBp * (omega + p.shifted))
-    drag, hs = felt(n) / p.q, n.Dh + n.R
-    c = 2 * hs * (n.Dht + n.Dhx * Y) / p.q
+    room, q = (e - taken(n)) / theorem_b.estimation_gain(n, Y, omega, g), 2 * g
+    drag, hs = felt(n) / q, n.Dh + n.R
+    c = 2 * hs * (n.Dht + n.Dhx * Y) / q
     K, A = hs**2 + c, room**2 - 2 * drag**2
     linear = A * K + 2 * drag**2 * c
     root = 2 * drag * np.sqrt(np.maximum(A * K * c + drag**2 * (c**2 + K**2), 0.0))
@@ -108,18 +105,18 @@ def recipes_at(
     R_H = problem.projection_radius
     n = problem.floats(R_H)
     omega, Gamma = (np.array([float(x) for x in xs]) for xs in (bandwidths, rates))
-    p = Predictor.of_gain(np.array([float(g) for g in gains]), omega)
+    g = np.array([float(own) for own in gains])
     e = np.zeros_like(omega)
     for _ in range(400):
         # Y is closed for a given e, so that only the error itself is iterated
         Y = theorem_b.least_speed(n, omega, e)
-        raised = theorem_b.error_needed(n, Y, omega, p, Gamma)
+        raised = theorem_b.error_needed(n, Y, omega, g, Gamma)
         settled = np.all(raised <= e * (1 + 1e-15))
         e = raised
         if settled:
             break
     Y = Y * (1 + inflation)
-    e = theorem_b.error_needed(n, Y, omega, p, Gamma) * (1 + 1e-12)
+    e = theorem_b.error_needed(n, Y, omega, g, Gamma) * (1 + 1e-12)
     S = theorem_b.uncertainty(n, Y, omega) * (1 + 1e-12) + 1e-12 * n.H0 + 1e-30
     return [
         DistanceRecipe(

@@ -14,10 +14,9 @@ import numpy as np
 
 from tubecert.bounds.constants import TABLE, Constant
 from tubecert.conditions.arithmetic import Array
-from tubecert.conditions.derived import rate_terms
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
-from tubecert.conditions.rates import RateRecipe
+from tubecert.conditions.rates import RateRecipe, rate_terms
 from tubecert.search.bandwidths import RateSearch
 from tubecert.search.distance import least_rate
 from tubecert.search.rates import gains_along, needed_rate

@@ -14,11 +14,10 @@ from tubecert.conditions import distance as theorem_b
 from tubecert.conditions import rates as theorem_a
 from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import next_up, round_up
-from tubecert.conditions.derived import zetas
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.proposal import Asked, Proposal
-from tubecert.conditions.rates import RateRecipe, theta
+from tubecert.conditions.rates import RateRecipe, theta, zetas
 from tubecert.search import distance
 from tubecert.search.bandwidths import Bandwidth, RateSearch, bandwidth, bandwidths_around
 from tubecert.search.scan import minimum_log, serves, smallest
@@ -32,8 +31,8 @@ _SLACK = 1e-12
 @quiet
 def needed_rate(s: RateSearch, omega: Array, g: Array) -> Array:
     """The Gamma of (26c), infinite where (26b) leaves nothing."""
-    z = zetas(s.n, s.terms, omega)
-    rest = s.n.a - z.zeta2 - z.zeta3
+    _, zeta2, zeta3 = zetas(s.n, s.terms, omega)
+    rest = s.n.a - zeta2 - zeta3
     value = (theta(s.n, s.terms, omega, g) / (s.n.rho_a * rest)) ** 2
     return np.where(rest > 0, value, np.inf)
 
