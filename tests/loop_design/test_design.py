@@ -1,6 +1,7 @@
 """What the search finds, against numbers of other searches, in other units, and where there is nothing to find."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from plants import double, plant, pvtol, scalar
 from tubecert.loop_design.certification import certify
 from tubecert.loop_design.design import design
 from tubecert.loop_design.unfound import NoDesign
-from tubecert.spec import load_text
+from tubecert.spec import load, load_text
+from tubecert.spec.override import Setting
 
 
 def mean(W):
@@ -44,6 +46,14 @@ def test_a_quadrotor_with_noise_keeps_a_tube_within_its_inputs():
     x, z = [0, 2, 3, 5], [1, 4]  # hovering decouples
     assert not found.N[np.ix_([0], x)].any()
     assert not found.N[np.ix_([1], z)].any()
+
+
+@pytest.mark.slow
+def test_a_remainder_that_a_start_brings_falls_with_it():
+    settings = {"initial_state": "{within: 1}", "tube.half_widths": "{x1: 1.2, x2: 1.1}"}
+    path = Path(__file__).parents[2] / "configs/hardware_orbit.yaml"
+    result = certify(load(str(path), [Setting(path=key, text=text) for key, text in settings.items()])).result
+    assert result.verdict == "certified"
 
 
 @pytest.mark.slow

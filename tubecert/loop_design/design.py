@@ -113,15 +113,24 @@ class _Search:
         self.singles = np.eye(len(sorts))[(many > 1) | (sorts == 0) | (sorts == 5)]
 
     def _reach(self, weights: Array, steps: int) -> tuple[Response, Array, Array] | None:
-        """The response, W for ever and in the long run (2, n), and U."""
+        """The response, W for ever and in the long run (2, n), and U; without `steps`, no remainder grows.
+
+        A tube falls after a start: for ever it has half the remainder of its beginning, half that of its long run.
+        """
         self.evaluations += 1
-        theta = self.observer.table(weights)
-        if theta is None or not (response := respond(self.plant, self.observer.sample, theta, SEARCHED)):
+        theta, plant = self.observer.table(weights), self.plant
+        if theta is None or not (response := respond(plant, self.observer.sample, theta, SEARCHED)):
             return None
-        added = response.gain @ self.constant if steps == 0 else 0.0
-        both = [response.ever, response.long_run] if self.counts[1] else [response.ever]
-        found = [settle(self.plant, SPARE * response.gain, rows + added, steps)[0] for rows in both]
-        return response, np.array([found[0], found[-1]])[:, : self.n], found[0][self.n :]
+        if steps == 0:
+            added = response.gain @ self.constant
+            late, ever = (sizes(plant, rows + added) for rows in (response.long_run, response.ever))
+        else:
+            gain = SPARE * response.gain
+            late = settle(plant, gain, response.long_run, steps)[0]
+            rest = rest_at(plant, late)
+            first = sizes(plant, response.ever + gain @ rest)
+            ever = sizes(plant, response.ever + gain @ (0.5 * rest + 0.5 * rest_at(plant, first)))
+        return response, np.array([ever, late])[:, : self.n], ever[self.n :]
 
     def value(self, weights: Array) -> float:
         """What the search makes small.
