@@ -67,7 +67,7 @@ ELSEWHERE: Final[Mapping[str, str]] = {
     "tand": "write tan(x*pi/180)",
     **dict.fromkeys(("pow", "power"), "write x**2; exponents are whole numbers"),
     **dict.fromkeys(("sqr", "square"), "write x**2"),
-    "cbrt": "roots but the square root are not smooth at 0 and not available; exp(log(x)/3) is one for x > 0",
+    "cbrt": "write exp(log(x)/3), for x > 0; at 0 a cube root is not differentiable",
     "hypot": "write sqrt(x**2 + y**2) where it is not 0, or norm(x, y) in h",
     "fabs": "write abs(x), in h only; elsewhere sqrt(x**2 + 0.01) may serve",
     **dict.fromkeys(("erf", "erfc"), "tanh(1.2*x) is within 0.02 of erf(x)"),

@@ -232,15 +232,13 @@ class _Lowering:
 
     def _exponent(self, node: ast.BinOp) -> int:
         value, words = self.values[node.right], self._source(node.right)[:40]
-        if value.is_constant and value.fraction.denominator == 2:
-            help = "write sqrt(...): x**1.5 is x*sqrt(x), x**-0.5 is 1/sqrt(x)"
-            raise self._error(node.right, f"the exponent {words} is not an integer", help=help)
         if not value.is_constant or value.fraction.denominator != 1:
-            raise self._error(
-                node.right,
-                f"the exponent {words} is not an integer",
-                help="exponents are integers; sqrt and exp are functions: a**x is exp(x*log(a))",
-            )
+            help = "exponents are integers; sqrt and exp are functions: a**x is exp(x*log(a))"
+            if value.is_constant:
+                base, known = self._source(node.left), isinstance(node.left, ast.Name | ast.Call)
+                help = _root(base, value.fraction) if known and len(base) <= 20 else ""
+                help = help or f"{_root('x', value.fraction)} in place of x**({value.fraction})"
+            raise self._error(node.right, f"the exponent {words} is not an integer", help=help)
         if abs(value.fraction) > MAX_EXPONENT:
             raise self._error(
                 node.right,
@@ -296,6 +294,20 @@ def within(lookup: Lookup, argument: Expression) -> tuple[Expression, Expression
 
 def _ends(lookup: Lookup) -> str:
     return f"from {float(lookup.knots[0]):g} to {float(lookup.knots[-1]):g}"
+
+
+def _root(base: str, exponent: Fraction) -> str:
+    """What to write for a power that is not whole: halves and quarters by square roots, others by exp and log."""
+    whole, rest = divmod(abs(exponent), 1)
+    if 4 % rest.denominator:
+        return f"write exp({exponent}*log({base})), for {base} > 0"
+    root = f"sqrt({base})"
+    powers = [base if whole == 1 else f"{base}**{whole}"] if whole else []
+    powers += [root] * (rest >= Fraction(1, 2)) + [f"sqrt({root})"] * (rest.denominator == 4)
+    product = "*".join(powers)
+    if exponent < 0:
+        product = f"1/({product})" if len(powers) > 1 else f"1/{product}"
+    return f"write {product}"
 
 
 def _bits(e: Expression) -> int:

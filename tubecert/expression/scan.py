@@ -107,6 +107,7 @@ _FOREIGN = {
     "$": "remove it",
 }
 _EQUATION = re.compile(r"[:=!<>]?=")
+_IN_TIME = re.compile(r"\b([A-Za-z_]\w*)(\s*\(\s*t\s*(?:([-+])[^()]*)?\))", re.ASCII)
 _LOOKALIKES = {
     "\u2212": "-", "\u2010": "-", "\u2011": "-", "\u2012": "-", "\u2013": "-", "\u2014": "-", "\ufe63": "-",
     "\uff0d": "-", "\u00d7": "*", "\u00b7": "*", "\u22c5": "*", "\u2217": "*", "\u2219": "*", "\u2022": "*",
@@ -140,10 +141,25 @@ def scan(text: str, vocabulary: Vocabulary) -> None:
         raise ExpressionError("the expression is empty", help="write 0 if zero is meant")
     if found := _EQUATION.search(text):  # before its left side is taken for an unknown name
         raise _foreign(text, found.start())
+    for found in _IN_TIME.finditer(text):
+        if found[1] in vocabulary.symbols:
+            raise _in_time(found)
     walk = _Walk(vocabulary)
     for token in _tokens(text):
         walk.step(token)
     walk.finish(text)
+
+
+def _in_time(found: re.Match[str]) -> ExpressionError:
+    """The error for x(t), or x at another time."""
+    token = _Token("operator", found[2], found.start(2))
+    if found[3] is None:
+        return token.error(f"{found[1]} is its value at the time t already", f"write {found[1]}")
+    return token.error(
+        f"{found[0][:40]} reads as {found[1]} at another time, which expressions do not know",
+        "a delay of sensors and computer is hardware: {delay: 0.1}, in s; one in the plant takes states of its own; "
+        f"for a product write {found[1]}*(...)",
+    )
 
 
 def _tokens(text: str) -> Iterator[_Token]:
