@@ -282,6 +282,28 @@ def test_where_there_is_no_equilibrium_none_is_named():
     assert "f(at) + B(at) input = 0" in finding.help
 
 
+@pytest.mark.parametrize(("after", "said"), [("repeat", ["TC204"]), ("rest", []), ("nothing", [])])
+def test_a_plan_that_does_not_begin_again_is_told_before_certifying(tmp_path, after, said):
+    """`check` passed what `certify` refused."""
+    (tmp_path / "plan.csv").write_text("t,p,v,u\n0,0,0,0\n1,0.1,0,0\n")
+    plans = ['{kind: expressions, x: ["0.1*t", "0.1"], u: ["0.2*t + 0.1"]', "{kind: csv, file: plan.csv"]
+    for plan in plans:
+        told = f"{plan}, horizon: 1, afterwards: {after}}}"
+        (tmp_path / "base.yaml").write_text(changed((HELD, told), (START, ""), (FROM_METRIC, MACHINE)))
+        findings = pipeline.inspect(load(str(tmp_path / "base.yaml")))
+        assert [item.code for item in findings if item.code == "TC204"] == said, findings
+    round_trip = changed((HELD, MOVING.replace("5}", f"7, afterwards: {after}}}") % "0"), (START, ""))
+    findings = found(round_trip.replace(FROM_METRIC, MACHINE))
+    assert not [item for item in findings if item.code == "TC204"]
+
+
+def test_who_has_no_metric_is_told_that_a_computer_needs_none():
+    """The keys of a metric alone were named."""
+    told = pipeline.checks.missing_parts(load_text(changed((FROM_METRIC, "")), "base.yaml"))
+    assert told[0].message == "metric is needed to certify"
+    assert "hardware: {rate: 500}" in told[0].help
+
+
 def test_the_rate_that_a_point_allows_is_named():
     [finding] = found(changed(("rate: 0.4", "rate: 0.6")))
     assert re.search(r"supports 0\.5 at most", finding.message)

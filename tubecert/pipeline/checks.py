@@ -7,7 +7,7 @@ from pathlib import Path
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import lint, name_findings
-from tubecert.model import build, domain_findings, place, rank_decision
+from tubecert.model import build, domain_findings, place, rank_decision, unending
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.load import NO_SEARCH
 from tubecert.spec.metric_file import of_no_metric
@@ -19,6 +19,9 @@ def inspect(spec: Spec, budget: int = 200_000) -> list[Finding]:
     """What is wrong with, or odd about, the mathematics of a specification, without certifying it."""
     findings, time = time_of(spec)
     effort = Effort(budget=budget)
+    if spec.hardware is not None and spec.trajectory.task is None:  # whose knots are still to be found
+        table = spec.trajectory.table
+        findings = findings or unending(spec, None if table is None else table.knots)
     if not findings:
         findings = domain_findings(spec, time, effort)
     if findings:
@@ -54,6 +57,7 @@ def missing_parts(spec: Spec) -> list[Finding]:
     if file.suffix in (".yaml", ".yml"):
         remedy = f"`tubecert synth {spec.path}` finds one; then add --metric {found}. Or {remedy}"
     has_none = spec.metric is None and spec.synthesis is None
+    remedy += ". Beside hardware: {rate: 500}, the computer of the loop, no metric is needed, and no radius"
     return [*([_missing(spec, "metric", remedy)] if has_none else []), *missing_radii(spec)]
 
 

@@ -253,21 +253,6 @@ class Loop:
         end = max(0.0 if self.plan.horizon is None else float(self.plan.horizon), float(period.hi))
         return (0.0, number_above(end)) if end else None
 
-    def goes_on(self) -> bool:
-        """Whether the plan is known for all times of the claim: `repeat` needs a plan that repeats.
-
-        Formulas go on as they are, with a period that is not longer than the horizon; knots begin again, which needs
-        equal ends and a horizon of whole samples.
-        """
-        end = self.plan.horizon
-        if self.afterwards != "repeat" or end is None:
-            return True
-        if (knots := self.plan.knots) is not None:
-            whole = (end / self.sample_time).denominator == 1 and knots.t[-1] == end
-            return whole and knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
-        period = time_period([*self.plan.x, *self.plan.u])
-        return period is not None and bool(period.hi <= fraction_bounds(end)[0])
-
     @cached_property
     def defect(self) -> Array:
         """sup |x*_i' - F_i(x*, u*, p0)| while the plan moves, (n,)."""

@@ -23,7 +23,7 @@ from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.enclosure.outward import number_above, number_below
 from tubecert.enclosure.processor import require_ieee
 from tubecert.findings import Finding
-from tubecert.model import ControlAffineModel, domain_findings
+from tubecert.model import ControlAffineModel, domain_findings, unending
 from tubecert.sampled_loop.cells import MOST
 from tubecert.sampled_loop.matrices import SUMMED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
@@ -309,20 +309,7 @@ def _short(loop: Loop, found: Boxes, claimed: Boxes) -> list[Lack]:
 
 def undefined(loop: Loop) -> list[Finding]:
     """What is not proven to be defined on the safe set, or at a time that matters; a plan that does not go on."""
-
-    def refused(path: str, message: str, help: str) -> Finding:
-        return Finding(code="TC204", message=message, location=loop.spec.location(path), help=help)
-
-    try:
-        found = domain_findings(loop.spec, loop.times, _CAREFUL)
-    except ValueError:
-        unseen = "h depends on t for ever, without a period that can be seen"
-        return [refused("uncertainty.h", unseen, "give trajectory.horizon, in s")]
-    if found or loop.goes_on():
-        return found
-    ends = "the plan does not repeat: its ends differ, or its period is longer than the horizon or unknown"
-    help = "leave out afterwards, or give a plan whose period is not longer than trajectory.horizon"
-    return [refused("trajectory.afterwards", ends, help)]
+    return unending(loop.spec, loop.plan.knots) or domain_findings(loop.spec, loop.times, _CAREFUL)
 
 
 def _domain(loop: Loop, inequalities: Inequalities, boxes: Boxes) -> list[Lack]:
