@@ -204,6 +204,26 @@ def test_degrees_in_a_sine_are_told(unit):
     assert found(text.replace("-k*p", "-k*sin(pi/180*p)").replace("rate: 0.4", "rate: 0.1")) == []
 
 
+def test_a_set_that_reads_as_degrees_is_told():
+    """[-45, 45] beside a sine was taken for seven turns without a word."""
+    text = changed(("-k*p", "-k*sin(p)"), ("p: [-1, 1]", "p: [-45, 45]"))
+    [note] = [item for item in found(text) if item.code == "TC132"]
+    assert (note.severity, str(note.location)[-4:]) == (Severity.WARNING, "9:15")
+    assert "7.2 turns" in note.message
+    assert "[-45 deg, 45 deg]" in note.help
+    for good in (("sin(p)", "p"), ("sin(p)", "sin(p/50)"), ("45", "7"), ("sin(p)", "sin(pi*p/180)")):
+        assert not [item for item in found(text.replace(*good)) if item.code == "TC132"]
+
+
+def test_a_unit_of_time_that_is_no_second_is_told():
+    """S24: a file in minutes is reported in rad/s and s."""
+    [note] = found(changed(("  states: [p, v]", "  units: {p: m, v: m/min, u: N}\n  states: [p, v]")))
+    assert (note.code, note.severity, str(note.location)[-4:]) == ("TC132", Severity.NOTE, "4:20")
+    assert "the time of this file is in min" in note.message
+    for v in ("m/s", "1/min"):
+        assert not found(changed(("  states: [p, v]", f"  units: {{p: m, v: {v}, u: N}}\n  states: [p, v]")))
+
+
 def test_a_plan_file_in_degrees_is_taken_for_one(tmp_path):
     (tmp_path / "plan.csv").write_text(CSV % "-17.2")
     for f, told in (("-k*p", False), ("-k*sin(p)", True)):
@@ -329,6 +349,13 @@ def test_extreme_numbers_are_no_trouble(value, place):
 def test_floats_say_nothing_about_an_ill_conditioned_metric():
     flat = "  dual_metric: [[1e-9, -0.5e-9], [-0.5e-9, 1e3]]"
     assert "TC302" not in {item.code for item in found(changed((W, flat), ("rate: 0.4", "rate: 0.6")))}
+
+
+def test_a_notation_is_told_in_one_line():
+    """V12: four warnings on the areas A1 and a1 of four tanks."""
+    known, product = "A1: 1, a1: 2, A2: 1, a2: 2, A3: 1, a3: 2", "-a1*p*A1*a2*A2*a3*A3"
+    [warning] = found(changed(("{k: 2}", f"{{{known}}}"), ("-k*p", product), ("rate: 0.4", "rate: 0.1")))
+    assert warning.message == "a1 is easily taken for A1, a2 for A2, a3 for A3"
 
 
 def test_customary_names_are_not_confusable():

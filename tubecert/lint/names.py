@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from itertools import combinations
 
-from tubecert.expression import FUNCTIONS, ZERO, Expression, free_symbols, number_text, to_text, topological
+from tubecert.digits import near
+from tubecert.expression import (
+    FUNCTIONS,
+    ZERO,
+    Expression,
+    derivatives,
+    free_symbols,
+    number_text,
+    to_text,
+    topological,
+)
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import codes
 from tubecert.spec import Spec
@@ -15,6 +26,9 @@ _WORDS = (*FUNCTIONS, "pi", "t")
 # of a cart and its pendulum: masses m and M, a length l beside an inertia I; a current i beside one
 _CUSTOMARY = {frozenset(pair) for pair in ("mM", "lI", "iI", "rR")}
 _BODY = re.compile(r"(?:m|M|J|I|l|L)(?:\d+|_\w+)?|[IJ][xyz]{1,2}|(?:mass|inertia|length)\w*", re.ASCII)
+_SHOWN = 4  # pairs of names
+_TURNS = 4 * math.pi  # no angle of a set is expected to be larger, in rad
+_PER_TIME = re.compile(r"(.+?) ?/ ?(min|h|hr|day|d|ms|us)")
 _DEGREES = re.compile(r"\bdeg(rees?)?\b|°")
 _ALIKE = str.maketrans({"O": "0", "o": "0", "l": "1", "I": "1", "i": "1"})
 
@@ -27,6 +41,8 @@ def name_findings(spec: Spec) -> list[Finding]:
         *_negative(spec),
         *_units(spec),
         *_degrees(spec),
+        *_many_turns(spec),
+        *_unit_of_time(spec),
         *_idle(spec),
         *_expectation(spec),
     ]
@@ -62,9 +78,16 @@ def _confusable(spec: Spec) -> Iterator[Finding]:
         if word is not None:
             what = {"t": "the time", "pi": "the number"}.get(word, "the function")
             yield _alike(spec, name, f"{name} is easily taken for {what} {word}")
-    for first, second in combinations(names, 2):
-        if _folded(first) == _folded(second) and not _customary(first, second):
-            yield _alike(spec, second, f"{second} is easily taken for {first}")
+    pairs = [
+        (second, first)
+        for first, second in combinations(names, 2)
+        if _folded(first) == _folded(second) and not _customary(first, second)
+    ]
+    if pairs:  # a notation is one habit: one finding for all of them
+        told = [f"{second} for {first}" for second, first in pairs[1:_SHOWN]]
+        more = [f"{len(pairs) - _SHOWN} more"] if len(pairs) > _SHOWN else []
+        message = f"{pairs[0][0]} is easily taken for {pairs[0][1]}"
+        yield _alike(spec, pairs[0][0], ", ".join([message, *told, *more]))
 
 
 def _negative(spec: Spec) -> Iterator[Finding]:
@@ -138,6 +161,44 @@ def _degrees(spec: Spec) -> Iterator[Finding]:
                 location=spec.location(f"system.units.{name}"),
                 help=f"let {name} be in rad (numbers may be written in degrees: 30 deg), or write pi/180*{name} there",
             )
+
+
+def _many_turns(spec: Spec) -> Iterator[Finding]:
+    """Ends of the safe set that read as degrees: an angle, taken as it is, that goes round more than twice."""
+    told = {name for name, unit in spec.units if _DEGREES.search(unit)}
+    for name, ends in zip(spec.states, spec.safe_set, strict=True):
+        if name in told or max(map(abs, ends)) <= _TURNS:
+            continue
+        slopes = ((e, derivatives(e.args, name)[0]) for e in turned(spec, name))
+        own = next((e for e, slope in slopes if slope.is_constant and abs(slope.fraction) == 1), None)
+        if own is not None:
+            low, high = map(number_text, ends)
+            yield Finding(
+                code=codes.UNITS,
+                severity=Severity.WARNING,
+                message=f"safe_set.{name} is [{low[:20]}, {high[:20]}], and {to_text(own)[:60]} takes radians: "
+                f"that is {near(float(max(map(abs, ends))) / (2 * math.pi), 2)} turns",
+                location=spec.location(f"safe_set.{name}"),
+                help=f"if these are degrees, write [{low[:20]} deg, {high[:20]} deg]",
+            )
+
+
+def _unit_of_time(spec: Spec) -> Iterator[Finding]:
+    """Units that say that time is not in seconds: a state whose derivative is another one, in its unit per minute."""
+    units = dict(spec.units)
+    for name, term in zip(spec.states, spec.f, strict=True):
+        rate = str(term.expression.value) if term.expression.op == "symbol" else ""
+        found = _PER_TIME.fullmatch(units.get(rate, ""))
+        if found and found[1] == units.get(name):
+            yield Finding(
+                code=codes.UNITS,
+                severity=Severity.NOTE,
+                message=f"f has {name}' = {rate}, in {units[rate]}: the time of this file is in {found[2]}",
+                location=spec.location(f"system.units.{rate}"),
+                help=f"nothing is converted: horizons are in {found[2]} and rates in 1/{found[2]} then, whatever a "
+                "report calls them; or write the dynamics in seconds",
+            )
+            return
 
 
 def _idle(spec: Spec) -> Iterator[Finding]:
