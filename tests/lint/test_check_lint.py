@@ -296,6 +296,46 @@ def test_the_equilibrium_near_a_point_is_written_out():
     assert "write input: [0];" in finding.help  # the point is held, by another input
 
 
+CAR = """
+tubecert: 1
+name: car
+system:
+  states: [x, y, a]
+  inputs: [w]
+  f: ["3*cos(a)", "3*sin(a)", 0]
+  B: [[0], [0], [1]]
+safe_set: {x: [-1, 20], y: [-1, 1], a: [-0.7, 0.7]}
+uncertainty: {h: ["0.01*sin(t)"]}
+trajectory: {kind: expressions, x: ["3*t", 0, 0], u: [0], horizon: 5}
+metric: {synthesise: {}}
+tube: {epsilon: 0.1, rho_a: 0.05}
+"""
+
+
+def test_a_direction_that_no_input_reaches_along_a_plan_is_told_before_a_search():
+    """V8: 66 attempts ended with "lower the rate", and no rate can help."""
+    [finding] = found(CAR)
+    assert (finding.code, finding.severity) == ("TC208", Severity.WARNING)
+    assert "along the plan, no input reaches x, which does not decay by itself" in finding.message
+    turned = CAR.replace('["3*t", 0, 0]', '["9*t/5", "12*t/5", "atan(4/3)"]').replace("0.7]", "1]")
+    turned = turned.replace("y: [-1, 1]", "y: [-1, 15]") + "initial_state: {at: [0, 0, 0.927]}\n"
+    [finding] = [item for item in found(turned) if item.code == "TC208"]
+    assert "no input reaches 0.75*x + y, which" in finding.message
+    sampled = CAR.replace(
+        "metric: {synthesise: {}}\ntube: {epsilon: 0.1, rho_a: 0.05}", "hardware: {rate: 50}"
+    )
+    assert [(item.code, item.severity) for item in found(sampled)] == [("TC208", Severity.NOTE)]
+
+
+def test_what_is_reached_somewhere_along_a_plan_is_no_such_direction():
+    curve = CAR.replace('["3*t", 0, 0], u: [0]', '["3*sin(t/2)*2", "6 - 6*cos(t/2)", "t/2"], u: [0.5]')
+    assert not [item for item in found(curve) if item.code == "TC208"]
+    slow = CAR.replace("3*cos(a)", "3*cos(a) - 0.5*x").replace('["3*t"', '["6 - 6*exp(-t/2)"')
+    for rate, told in (("0.4", 0), ("0.6", 1)):
+        text = slow.replace("synthesise: {}", f"synthesise: {{rate: {rate}}}")
+        assert sum("decays by itself at 0.5 1/s" in item.message for item in found(text)) == told
+
+
 def test_where_there_is_no_equilibrium_none_is_named():
     text = changed(("[v, ", "[1 + v**2, "))
     [finding] = [item for item in found(text) if item.code == "TC404"]

@@ -11,7 +11,7 @@ would refute, a warning what is hardly meant, a note what is worth knowing. Trus
 | `table` | a plan from a file against the dynamics: rows, units of time, exchanged columns |
 | `uncertainty` | h that is zero, declared bounds that are broken or loose |
 | `floats` | exact numbers as floats |
-| `metric` | C1-C3 and declared bounds at points; modes that no metric can contract |
+| `metric` | C1-C3 and declared bounds at points; what no input reaches along the plan |
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.domain import Range
 from tubecert.findings import Finding, Severity
 from tubecert.lint.codes import CODES, LEFT_OUT
-from tubecert.lint.metric import metric_findings
+from tubecert.lint.metric import metric_findings, reach_findings
 from tubecert.lint.names import name_findings
 from tubecert.lint.plan import plan_findings
 from tubecert.lint.uncertainty import uncertainty_findings
@@ -38,7 +38,8 @@ def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
     with np.errstate(all="ignore"):  # what overflows is not finite, and nothing is said about it
         findings = [*name_findings(spec), *metric_findings(spec), *_left_out(spec)]
         if not spec.lacks:  # else it asks about a metric alone
-            findings += [*plan_findings(spec), *uncertainty_findings(spec, time, effort)]
+            findings += [*reach_findings(spec), *plan_findings(spec)]
+            findings += uncertainty_findings(spec, time, effort)
     if spec.expect is not None and "refuted" in (spec.expect.verdict, spec.expect.metric):
         return [replace(item, severity=Severity.NOTE) for item in findings]
     return findings

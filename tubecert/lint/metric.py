@@ -1,4 +1,4 @@
-"""The metric at points of the safe set, in floats with room for rounding; and modes that no metric can contract.
+"""The metric at points of the safe set, in floats with room for rounding; what no input reaches along the plan.
 
 What is found here is certain enough to be named before a certification proves it; what is not found proves nothing.
 """
@@ -14,9 +14,11 @@ from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, is_zero
+from tubecert.expression.matrix import jacobian
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.floats import floats, nearest
+from tubecert.lint.plan import curve_of
 from tubecert.model import TIME, ControlAffineModel, build, place
 from tubecert.spec import Spec
 
@@ -28,7 +30,7 @@ _ILL = 1e8  # beyond this condition number floats say nothing about a rate or a 
 
 
 def metric_findings(spec: Spec) -> list[Finding]:
-    """Findings about the metric, if there is one, and about the dynamics that it has to contract."""
+    """Findings about the metric, if there is one."""
     if spec.metric is None:
         return []
     model = build(spec)
@@ -43,12 +45,8 @@ def metric_findings(spec: Spec) -> list[Finding]:
         return [_indefinite(spec, points[k], lowest[k])]
     killing = list(_killing(spec, model))
     if np.linalg.cond(W).max() > _ILL:
-        return killing or list(_modes(spec, model))
-    return killing or [
-        *_contraction(spec, model, points, W),
-        *_declared(spec, points, W),
-        *_modes(spec, model),
-    ]
+        return killing
+    return killing or [*_contraction(spec, model, points, W), *_declared(spec, points, W)]
 
 
 def _points(spec: Spec) -> Array:
@@ -161,30 +159,80 @@ def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:
             )
 
 
-def _modes(spec: Spec, model: ControlAffineModel) -> Iterator[Finding]:
-    """Eigenvalues of d(f + B u*)/dx at an equilibrium that B does not reach (Hautus): no rate lies beyond them."""
+def reach_findings(spec: Spec) -> list[Finding]:
+    """A combination of states that no input reaches along the plan, and that decays too slowly by itself, or not."""
     plan = spec.trajectory
-    if plan.kind != "equilibrium" or spec.lacks:
-        return
-    x, u = ([nearest(term.expression.fraction) for term in terms] for terms in (plan.x, plan.u))
-    at = np.array([x])
-    A, B = _values(model.f_x, model, at)[0], _values(model.B, model, at)[0]
-    for value, slope in zip(u, model.b_x, strict=True):
-        A = A + value * _values(slope, model, at)[0]
+    if plan.task is not None or plan.bundle is not None:
+        return []
+    model, curve = build(spec), curve_of(spec)
+    every = slice(None, None, -(-len(curve.t) // _POINTS))
+    names, n = (*model.states, *model.inputs, TIME), len(model.states)
+    slopes = jacobian([row[0] for row in model.drift_on_plan()], model.states)
+    tape = Tape([e for row in (*slopes, *model.B) for e in row], names)
+    points = [*curve.x[every].T, *curve.u[every].T, curve.t[every]]
+    values = tape.run_floats(points, points[-1].shape).T
+    size = np.array([nearest(high - low) / 2 for low, high in spec.safe_set])
+    A = values[:, : n * n].reshape(-1, n, n) * size / size[:, None]
+    B = values[:, n * n :].reshape(len(A), n, -1) / size[:, None]
     if not (np.isfinite(A).all() and np.isfinite(B).all()):
-        return
-    scale = max(float(np.linalg.norm(A)), float(np.linalg.norm(B)), 1e-300)
-    rate = nearest(model.rate)
-    for value in np.linalg.eigvals(A):
-        test = np.concatenate([value * np.eye(len(A)) - A, B], axis=1) / scale
-        reached = np.linalg.svd(test, compute_uv=False)[-1] > _ROUNDING
-        if not reached and value.real > -rate * (1 - _ROUNDING) + _ROUNDING * scale:
-            yield Finding(
-                code=codes.SLOW_MODE,
-                severity=Severity.WARNING,
-                message=f"at the equilibrium, inputs do not reach a mode with eigenvalue {near(value.real, 4)} 1/s: "
-                f"no metric contracts at the rate {near(rate)}",
-                location=spec.location("metric.rate"),
-                help="lower metric.rate, or add an input that reaches this mode",
-            )
-            return
+        return []
+    U = _unreached(A, B)
+    if not U.shape[1]:
+        return []
+    value, direction = _by_itself(U.T @ A @ U)
+    scale = max(float(np.linalg.norm(A, axis=(1, 2)).max()), 1e-300)
+    asked = spec.metric.rate if spec.metric else spec.synthesis.rate if spec.synthesis else None
+    rate = 0.0 if asked is None else nearest(asked)
+    if value <= -rate * (1 - _ROUNDING) + _ROUNDING * scale * (1 if rate else -1):
+        return []
+    shares = U @ direction / size
+    shares /= shares[np.argmax(np.abs(shares))]
+    named = {name: float(own) for name, own in zip(spec.states, shares, strict=True) if abs(own) > _ROUNDING}
+    what = " + ".join(name if own == 1 else f"{near(own, 3)}*{name}" for name, own in named.items())
+    held = plan.kind == "equilibrium"
+    decays = value < -_ROUNDING * scale
+    speed = f"decays by itself at {near(-value, 4)} 1/s" if decays else "does not decay by itself"
+    within = "" if held else "that is the same along the plan "
+    lower = "lower metric.rate, or " if decays else ""
+    message = f"{'at the equilibrium' if held else 'along the plan'}, no input reaches {what}, which {speed}"
+    if spec.hardware is None:
+        message += f": no metric {within}contracts at {f'the rate {near(rate)}' if rate else 'any rate'}"
+    return [
+        Finding(
+            code=codes.SLOW_MODE,
+            severity=Severity.WARNING if spec.hardware is None else Severity.NOTE,
+            message=message,
+            location=spec.location("metric.rate") or spec.location("trajectory"),
+            help=f"{lower}add an input that moves it, or leave it out of the states",
+        )
+    ]
+
+
+def _unreached(A: Array, B: Array) -> Array:
+    """Columns (n, r) that span the c for which c'x goes its own way, whatever inputs do, by (K, n, n) and (K, n, m)."""
+    scale = max(float(np.abs(B).max(initial=0.0)), 1e-300)
+    U = _left_null(np.hstack(list(B)) / scale)
+    while U.shape[1]:
+        outside = U.T @ A - U.T @ A @ U @ U.T
+        kept = _left_null(np.hstack(list(outside)) / max(float(np.abs(A).max()), 1e-300))
+        if kept.shape[1] == U.shape[1]:
+            break
+        U = U @ kept
+    return U
+
+
+def _left_null(matrix: Array) -> Array:
+    """An orthonormal basis of the y with y' matrix = 0, as columns."""
+    left, values, _ = np.linalg.svd(matrix)
+    return np.asarray(left[:, int((values > _ROUNDING).sum()) :])
+
+
+def _by_itself(M: Array) -> tuple[float, Array]:
+    """How fast z' = M z grows at most, in 1/s, and the combination of z that does; of an M (K, r, r) that changes along
+    the plan the mean over its directions, which one of them exceeds.
+    """
+    if np.abs(M - M[0]).max() > _ROUNDING * np.abs(M).max():
+        return float(np.trace(M, axis1=1, axis2=2).mean()) / M.shape[1], np.eye(M.shape[1])[0]
+    values, vectors = np.linalg.eig(M[0].T)
+    k = int(np.argmax(values.real))
+    return float(values[k].real), vectors[:, k].real

@@ -30,7 +30,7 @@ _STEPS, _LEFT = 20, 1e-13  # of Newton's method, and where it ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Curve:
+class Curve:
     """Points of a plan: `t` (K,) in s, `x` (K, n), `u` (K, m), and where the plan stands in the file."""
 
     t: Array
@@ -41,7 +41,7 @@ class _Curve:
 
 def plan_findings(spec: Spec) -> list[Finding]:
     """Findings about the plan, the start and the obstacles."""
-    curve = _curve(spec)
+    curve = curve_of(spec)
     findings = [*_start(spec)]
     outside = list(_outside(spec, curve))
     findings += outside or _room(spec, curve)
@@ -53,13 +53,13 @@ def plan_findings(spec: Spec) -> list[Finding]:
     return findings if spec.trajectory.bundle is not None else [*findings, *_obstacles(spec, curve)]
 
 
-def _curve(spec: Spec) -> _Curve:
+def curve_of(spec: Spec) -> Curve:
     """Samples of the plan; of a plan that is still to be made, its two ends; of a family, two corners."""
     plan = spec.trajectory
     if plan.table is not None:
         knots = plan.table.knots
         kept = [k for k, t in enumerate(knots.t) if plan.horizon is None or t <= plan.horizon]
-        return _Curve(
+        return Curve(
             t=floats([knots.t[k] for k in kept]),
             x=np.array([floats(knots.x[k]) for k in kept]),
             u=np.array([floats(knots.u[k]) for k in kept]),
@@ -71,16 +71,16 @@ def _curve(spec: Spec) -> _Curve:
         here = "trajectory.target" if plan.task.goal else "trajectory.start"
         count = 2 if plan.task.goal else 1
         u = np.zeros((count, len(spec.inputs)))
-        return _Curve(t=np.array([0.0, last])[:count], x=ends[:count], u=u, path=here)
+        return Curve(t=np.array([0.0, last])[:count], x=ends[:count], u=u, path=here)
     if plan.bundle is not None:  # the corners that are farthest out
         corners = np.array([floats([ends[side] for ends in plan.bundle.x]) for side in (0, 1)])
-        return _Curve(t=np.zeros(1), x=corners, u=np.zeros((2, len(spec.inputs))), path="trajectory.x")
+        return Curve(t=np.zeros(1), x=corners, u=np.zeros((2, len(spec.inputs))), path="trajectory.x")
     count = 1 if plan.kind == "equilibrium" else _SAMPLES
     t = np.linspace(0.0, nearest(plan.horizon or Fraction(0)), count)
     tape = Tape([term.expression for term in (*plan.x, *plan.u)], (TIME,))
     both = tape.run_floats([t], t.shape).T
     n = len(spec.states)
-    return _Curve(t=t, x=both[:, :n], u=both[:, n:], path="trajectory.at" if count == 1 else "trajectory.x")
+    return Curve(t=t, x=both[:, :n], u=both[:, n:], path="trajectory.at" if count == 1 else "trajectory.x")
 
 
 def _sides(spec: Spec) -> tuple[Array, Array]:
@@ -111,7 +111,7 @@ def _start(spec: Spec) -> Iterator[Finding]:
             )
 
 
-def _outside(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+def _outside(spec: Spec, curve: Curve) -> Iterator[Finding]:
     k, i, beyond = _excess(spec, curve.x)
     scale = float(np.max(np.abs(_sides(spec))))
     if beyond > (0.0 if len(curve.t) == 1 else _ROUNDING * scale):
@@ -128,7 +128,7 @@ def _outside(spec: Spec, curve: _Curve) -> Iterator[Finding]:
         )
 
 
-def _beyond_limits(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+def _beyond_limits(spec: Spec, curve: Curve) -> Iterator[Finding]:
     """Inputs of the plan itself that are not within the limits: what feedback and adaptation need comes on top."""
     plan = spec.trajectory
     if plan.task is not None:  # its inputs are still to be found
@@ -166,7 +166,7 @@ def _least_radius(spec: Spec) -> float:
     return radius + (0.0 if spec.within is None else nearest(spec.within))
 
 
-def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+def _room(spec: Spec, curve: Curve) -> Iterator[Finding]:
     if spec.tube.auto or spec.hardware is not None:  # how far it reaches in x is to be found
         return
     offset = 0.0
@@ -187,7 +187,7 @@ def _room(spec: Spec, curve: _Curve) -> Iterator[Finding]:
     )
 
 
-def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Finding]:
+def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Finding]:
     """How far the plan is from x*' = f(x*) + B(x*) u*, against what the least tube can bear."""
     x, u = list(curve.x.T), list(curve.u.T)
     drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME))
@@ -237,7 +237,7 @@ def _defect(spec: Spec, curve: _Curve, model: ControlAffineModel) -> Iterator[Fi
         )
 
 
-def _equilibrium(spec: Spec, curve: _Curve, model: ControlAffineModel) -> str:
+def _equilibrium(spec: Spec, curve: Curve, model: ControlAffineModel) -> str:
     """What to write for the equilibrium near a point, by Newton's method; empty if none is found in the safe set.
 
     First the inputs alone move, then states as well, by equal shares of the safe set where there is a choice.
@@ -270,7 +270,7 @@ def _bearable(spec: Spec) -> float:
     return min(nearest(high - low) for low, high in spec.safe_set)
 
 
-def _obstacles(spec: Spec, curve: _Curve) -> Iterator[Finding]:
+def _obstacles(spec: Spec, curve: Curve) -> Iterator[Finding]:
     for j, obstacle in enumerate(spec.obstacles):
         i, k = (spec.states.index(name) for name in obstacle.states)
         path = f"obstacles[{j}]"
