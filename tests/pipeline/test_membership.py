@@ -157,6 +157,16 @@ def test_beside_hardware_inputs_move_as_the_family_says(tmp_path, family, at, ho
     assert told == (1 if at[1] == 0.2 else 0)
 
 
+@pytest.mark.parametrize(("u", "belongs"), [("0", True), ("pi/100", True), ("0.01*t", False)])
+def test_an_input_that_does_not_change_belongs_whatever_the_plan_does(u, belongs):
+    """A formula that moves was refused for a u* that never changes."""
+    plan = f'{{kind: expressions, x: ["0.1*sin(t)", "0.1*cos(t)"], u: ["{u}"], horizon: 1}}'
+    old = MACHINE.split("trajectory: ")[1].split("\n", maxsplit=1)[0]
+    text = MACHINE.replace(old, plan).replace("{within: 0.1}", "{at: [0, 0.1]}")
+    found = membership(load_text(text), load_text(MACHINE), "it")
+    assert any("u* changes while an input is held" in item.message for item in found) != belongs
+
+
 @pytest.mark.parametrize(("after", "belongs"), [("nothing", True), ("rest", False), ("repeat", False)])
 def test_a_plan_that_goes_on_after_its_horizon_is_proven_no_further(after, belongs):
     """It moves at t = 1, where the plant would have to stand still: the family has no such plan, and a defect of 0."""

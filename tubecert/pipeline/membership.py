@@ -18,7 +18,7 @@ from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
 from tubecert.errors import SpecError
-from tubecert.expression import ZERO, Expression, derivatives
+from tubecert.expression import ZERO, Expression, derivatives, free_symbols
 from tubecert.findings import Finding, Severity
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.printable import visible
@@ -109,7 +109,7 @@ def _boxes(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator
 def _held(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator[_Part]:
     """Beside hardware: |u*'| is within its rate; where there is none, u* changes only when a command begins to act."""
     machine, knots, rates = family.hardware, plan.knots, bundle.input_rate
-    if machine is None or (len(set(knots.u)) == 1 if knots else plan.is_constant):
+    if machine is None or (len(set(knots.u)) == 1 if knots else not free_symbols(plan.u)):
         return
     held = knots is not None and knots.interpolation == "hold"
     changes = pairwise(zip(knots.t, knots.u, strict=True)) if knots is not None and held else ()
