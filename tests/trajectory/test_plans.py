@@ -407,7 +407,8 @@ def test_degrees_of_a_plan_are_decimals(tmp_path):
 @pytest.mark.parametrize(
     ("text", "more", "words"),
     [
-        ("t,p,q,u\n0,1,0,\n1,1,0,0\n", "", "a number is missing"),
+        ("t,p,q,u\n0,1,0,\n1,1,0,0\n", "", "an input is missing in this row"),
+        ("t,p,q,u\n0,1,0,1\n1,1,0,nan\n2,1,0,0\n", "", "an input is missing in this row"),
         ("t,p,q,u\n0,1,0,0\n1,1,,0\n", "", "a number is missing"),
         ("t,p,q,u\n0,1,0,0\n1,1\n", "", "the row has 2 cells"),
         ("t,p,q,u\n0,1,0,0\n1,1e-299,0,0\n", ", columns: {p: {scale: 1e-9}}", "in its scale is nearer to 0"),

@@ -33,6 +33,10 @@ from tubecert.spec.values import Output
 
 TIME: Final = "t"
 MAX_STATES: Final = 32
+_NO_INPUT: Final = (
+    "what is proven is how near a controller keeps to a plan: name what it could move, with its column of B; of a "
+    "plant that is stable by itself it need not move anything: hardware: {rate: 500} and controller: none"
+)
 # Words of YAML and other spellings of Python's, and functions that the grammar may learn later.
 _RESERVED: Final = frozenset(
     RESERVED
@@ -199,7 +203,8 @@ def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[s
     ):
         count = len(field.node.items)
         code = codes.LIMIT if count else codes.WRONG_SHAPE
-        field.fail(code, f"{field.path} has {count} entries; there must be 1 to {MAX_STATES}")
+        help = "" if count or what == "state" else _NO_INPUT
+        field.fail(code, f"{field.path} has {count} entries; there must be 1 to {MAX_STATES}", help)
         return None
     items = field.items(None, f"{what} names") if field else None
     if items is None:

@@ -220,7 +220,9 @@ class _Rows:
         found: list[Fraction | None] = []
         for k, (place, scale) in enumerate(self.columns):
             absent = ends and k >= kept and row[place].text.lower() in _ABSENT
-            found.append(before[k] if absent and before else self._number(row[place], scale))
+            found.append(
+                before[k] if absent and before else self._number(row[place], scale, is_input=k >= kept)
+            )
         sound = [value for value in found if value is not None]
         if len(sound) < len(found):
             return None
@@ -230,7 +232,12 @@ class _Rows:
             self.sheet.fail(cell, codes.PLAN_TIMES, message, "times must increase from row to row")
         return sound
 
-    def _number(self, cell: Cell, scale: Fraction) -> Fraction | None:
+    def _number(self, cell: Cell, scale: Fraction, *, is_input: bool) -> Fraction | None:
+        if is_input and cell.text.lower() in _ABSENT:
+            message = "an input is missing in this row; the last row alone may lack inputs"
+            help = "give the value (if it is held, that before it), or leave the row out"
+            self.sheet.fail(cell, codes.NUMBER, message, help)
+            return None
         value = number(self.sheet, cell)
         if value is None or scale == 1:
             return value
