@@ -53,15 +53,13 @@ def propose(
     rough = Inequalities.made(remainders, controller, recipe)
     found = replace(rough, recipe=replace(recipe, cuts=_cuts(rough)))
     boxes = _fixed_point(found, _nothing(found), report)
-    for pieces in (True, False):
-        for parts in _PARTS[1:]:
-            own = found.recipe
-            recipe = replace(own, pieces=parts) if pieces else replace(own, panels=parts)
-            finer = Inequalities.made(remainders, controller, recipe)
-            gained = np.max(1 - finer.of(boxes).W / np.maximum(found.of(boxes).W, 1e-300))
-            if gained < _SETTLED:
-                break
-            found = finer
+    for panels in _PARTS[1:]:
+        finer = Inequalities.made(remainders, controller, replace(found.recipe, panels=panels))
+        if np.max(1 - finer.of(boxes).W / np.maximum(found.of(boxes).W, 1e-300)) < _SETTLED:
+            break
+        found = finer
+    if (pieces := _pieces(found, boxes)) > _PARTS[0]:
+        found = Inequalities.made(remainders, controller, replace(found.recipe, pieces=pieces))
     boxes = _fixed_point(found, boxes, report)
     if (several := _in_stages(found)) is not None:
         many = _fixed_point(several, _nothing(several), report)
@@ -73,6 +71,14 @@ def propose(
             found, boxes = fewer, _fixed_point(fewer, boxes, report)
             break
     return found, _stages(loop, boxes, found.starts)
+
+
+def _pieces(found: Inequalities, boxes: Boxes) -> int:
+    """As many as it takes for what chords miss, which falls with their square, to be worth no more."""
+    _, _, spread = found.terms(boxes)
+    missed = np.max(spread / np.maximum(boxes.W[0], 1e-300))
+    enough = (p for p in _PARTS[:-1] if 0.75 * missed * (_PARTS[0] / p) ** 2 < _SETTLED)
+    return next(enough, _PARTS[-1])
 
 
 def _shorter(found: Inequalities, lags: int) -> Inequalities:
