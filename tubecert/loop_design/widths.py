@@ -139,18 +139,21 @@ def respond(plant: Plant, sample: Sample, theta: Array, most: int) -> Response |
     rows[:-m, :held] += sample.rows
     powers = _powers(rows, loop, 2 * half)
     past = powers[:-1]
-    drawn = past[:, :, :n] @ np.hstack([*sample.kernels])
-    slope, level, wind, rest = parts(plant, drawn.reshape(*past.shape[:2], PANELS, -1))
+    drawn = past[:, :, :n].reshape(-1, n)
+    slope, level, wind, rest = (
+        np.stack([drawn @ panel for panel in part]).reshape(PANELS, *past.shape[:2], -1)
+        for part in parts(plant, sample.kernels)
+    )
     noise = _size(past @ (act @ theta[:, :n] * plant.noise), plant.noise_ball)
     now = np.pad(sample.now, (0, m)) + _size(direct[:, :n] * plant.noise, plant.noise_ball)
-    known = now + _summed(noise + _size(wind, plant.wind_ball).sum(2))
+    known = now + _summed(noise + _size(wind, plant.wind_ball).sum(0))
     entry = np.pad(sample.eta, ((0, m), (0, 0))) + _summed(past[:, :, :held] @ sample.H)
     lasting, from_start = _of_eta(plant, entry, slope, level)
     begun = (known + from_start + np.abs(powers[:, :, :n]) @ plant.start).max(axis=0)
     known += lasting
     kept = 1 / (1 - slowest**half)  # of what the second half of the lags adds: all the lags that follow
     long_run = known[half] + kept * (known[-1] - known[half])
-    rests = np.abs(rest).sum(2)
+    rests = np.abs(rest).sum(0)
     gain = np.pad(sample.now_rest, ((0, m), (0, 0))) + rests[:half].sum(0) + kept * rests[half:].sum(0)
     return Response(long_run=long_run, ever=np.maximum(begun, long_run), gain=gain, lags=lags)
 
@@ -167,8 +170,8 @@ def _of_eta(plant: Plant, entry: Array, slope: Array, level: Array) -> tuple[Arr
     of the rows, and all that is older is a signal of its magnitude. From the start it need not be cut.
     """
     panel = plant.sample_time / PANELS
-    grown = _summed(np.abs(slope + panel * entry[:-1, :, None]).sum(2) * plant.rate)
-    old = _summed(np.abs(level).sum(2) * plant.magnitude)
+    grown = _summed(np.abs(slope + panel * entry[:-1]).sum(0) * plant.rate)
+    old = _summed(np.abs(level).sum(0) * plant.magnitude)
     cut = np.minimum.accumulate(grown + np.abs(entry) * plant.magnitude - old, axis=0) + old
     return cut.sum(axis=2), np.minimum(cut, grown + np.abs(entry) * plant.eta_start).sum(axis=2)
 
