@@ -13,10 +13,9 @@ import numpy as np
 from tubecert.bounds.constants import Constant, Witness
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
-from tubecert.enclosure.domain import Range
+from tubecert.enclosure.domain import Domain, Range
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
 from tubecert.enclosure.objective import Objective, SumOfNorms, size_of
-from tubecert.enclosure.questions import Domain
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.progress import Progress
 from tubecert.trajectory import Plan

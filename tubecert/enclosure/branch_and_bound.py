@@ -17,19 +17,10 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert.enclosure.domain import Domain
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.objective import Estimate, Objective, Target
 from tubecert.enclosure.processor import require_ieee
-from tubecert.enclosure.questions import (
-    Bound,
-    Contract,
-    Domain,
-    Inside,
-    Priorities,
-    Steps,
-    Values,
-    answered,
-)
 from tubecert.executor import Executor, WorkerError
 from tubecert.progress import Phase, Progress, Step
 from tubecert.verdict import Verdict
@@ -85,8 +76,7 @@ class Decision:
 def decide(objective: Objective, domain: Domain, threshold: float, effort: Effort) -> Decision:
     """Decide whether objective < threshold on the whole domain."""
     with np.errstate(all="ignore"):
-        search = Search(objective, domain, effort, threshold)
-        found = answered(search.run(), objective, domain)
+        found = Search(objective, domain, effort, threshold).run()
     if found.below >= threshold:
         return Decision(verdict=Verdict.REFUTED, at=found.at, value=found.below, boxes=found.boxes)
     verdict = Verdict.CERTIFIED if found.above < threshold else Verdict.UNDECIDED
@@ -99,14 +89,11 @@ def supremum(objective: Objective, domain: Domain, effort: Effort) -> Supremum:
     Raises `ValueError` if the domain turns out empty.
     """
     with np.errstate(all="ignore"):
-        return answered(Search(objective, domain, effort).run(), objective, domain)
+        return Search(objective, domain, effort).run()
 
 
 class Search:
-    """One search, which asks its objective and its domain what it has to know, and goes on with the answers.
-
-    Whoever runs it answers: so several that are alike can be answered at once, with the same results.
-    """
+    """One search: what it has found, and how much it has examined."""
 
     def __init__(
         self, objective: Objective, domain: Domain, effort: Effort, threshold: float | None = None
@@ -135,7 +122,7 @@ class Search:
         """What bounds are to be: for a threshold, all that is below it is alike."""
         return Target(self.target, self.below if self.threshold is None else self.target)
 
-    def run(self) -> Steps[Supremum]:
+    def run(self) -> Supremum:
         """The supremum.
 
         Raises `ValueError` if the domain turns out empty.
@@ -143,9 +130,9 @@ class Search:
         lo, hi = self.domain.boxes(self.variables)
         bound = np.full(len(lo), np.inf)
         self.extent = hi.max(axis=0) - lo.min(axis=0)
-        yield from self._probe(0.5 * (lo + hi))
+        self._probe(0.5 * (lo + hi))
         alone = _ALONE if self.threshold is None else None
-        lo, hi, bound = yield from self.search(lo, hi, bound, alone)
+        lo, hi, bound = self.search(lo, hi, bound, alone)
         if len(lo) and self._goes_on:
             bound = self._apart(lo, hi, bound)
         above = float(max(self.settled, bound.max(initial=-np.inf), self.below))
@@ -160,7 +147,7 @@ class Search:
             reached=bool(above <= self.below + tolerance * (1 + 1e-9)),
         )
 
-    def search(self, lo: Array, hi: Array, bound: Array, alone: int | None = None) -> Steps[_Boxes]:
+    def search(self, lo: Array, hi: Array, bound: Array, alone: int | None = None) -> _Boxes:
         """Split boxes until none is left, the budget is spent or so many were examined; those that are left."""
         while len(lo) and self._goes_on and (alone is None or self.count < alone):
             order = np.argsort(-bound, kind="stable")
@@ -168,7 +155,7 @@ class Search:
             # the longer the queue, the more is taken at once: otherwise sorting would cost its square
             while done < min(len(lo), max(_BATCH, len(lo) // 4)) and self._goes_on:
                 take = order[done : done + _BATCH]
-                children.append((yield from self._round(lo[take], hi[take], bound[take])))
+                children.append(self._round(lo[take], hi[take], bound[take]))
                 done += _BATCH
             rest = np.sort(order[done:])
             kept = bound[rest] > self.target
@@ -223,21 +210,19 @@ class Search:
         refuted = self.threshold is not None and self.below >= self.threshold
         return self.count < self.effort.budget and not refuted
 
-    def _round(self, lo: Array, hi: Array, bound: Array) -> Steps[_Boxes]:
+    def _round(self, lo: Array, hi: Array, bound: Array) -> _Boxes:
         """Bound a batch of boxes, settle those at or below the target, split the others."""
-        yield (cut := Contract(self.variables, lo, hi))
-        lo, hi, alive = cut.answer
+        lo, hi, alive = self.domain.contract(self.variables, lo, hi)
         lo, hi, bound = lo[alive], hi[alive], bound[alive]
         self.count += len(alive)
         if not len(lo):
             return lo, hi, bound
-        yield from self._probe(0.5 * (lo + hi)[np.argsort(-bound, kind="stable")[:_PROBES]])
-        yield (above := Bound(lo[:, : self.own], hi[:, : self.own], self._asked))
-        estimate = self._widened(above.answer, lo, hi)
+        self._probe(0.5 * (lo + hi)[np.argsort(-bound, kind="stable")[:_PROBES]])
+        above = self.objective.upper(lo[:, : self.own], hi[:, : self.own], self._asked)
+        estimate = self._widened(above, lo, hi)
         bound = np.minimum(bound, estimate.upper)
-        yield from self._probe(estimate.corner[np.argsort(-bound, kind="stable")[:_PROBES]])
-        yield (promise := Priorities(self.variables, lo, hi, estimate))
-        priority = promise.answer
+        self._probe(estimate.corner[np.argsort(-bound, kind="stable")[:_PROBES]])
+        priority = self.domain.priorities(self.variables, lo, hi, estimate)
         choice = np.argmax(priority, axis=1) if priority.shape[1] else np.zeros(len(lo), dtype=np.intp)
         middle = _cuts(lo, hi, choice)
         rows = np.arange(len(lo))
@@ -274,18 +259,17 @@ class Search:
     def _settle(self, bound: Array) -> None:
         self.settled = max(self.settled, float(bound.max(initial=-np.inf)))
 
-    def _probe(self, points: Array) -> Steps[None]:
+    def _probe(self, points: Array) -> None:
         """Raise `below` by values at points proven to lie in the domain.
 
         Of places that are alike, as mirror images are, one is chosen by where it is: last digits differ between
         processors.
         """
-        yield (moved := Inside(self.variables, points))
-        lo, hi = moved.answer
+        lo, hi = self.domain.inside(self.variables, points)
         if not len(lo):
             return
-        yield (values_at := Values(lo[:, : self.own], hi[:, : self.own]))
-        values = np.where(np.isnan(values_at.answer), -np.inf, values_at.answer)
+        values = self.objective.lower(lo[:, : self.own], hi[:, : self.own])
+        values = np.where(np.isnan(values), -np.inf, values)
         places = 0.5 * (lo + hi)
         alike = np.flatnonzero(~_exceeds(values.max(), values))
         best = alike[_foremost(places[alike] / np.where(self.extent > 0, self.extent, 1.0))]
@@ -319,7 +303,7 @@ class _Part:
         with np.errstate(all="ignore"):
             search = Search(self.objective, self.domain, self.effort)
             search.below, search.extent = self.below, self.extent
-            _, _, bound = answered(search.search(*boxes), self.objective, self.domain)
+            _, _, bound = search.search(*boxes)
         above = float(max(search.settled, bound.max(initial=-np.inf)))
         return _Held(below=search.below, above=above, at=search.at, boxes=search.count)
 

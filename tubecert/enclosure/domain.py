@@ -1,9 +1,10 @@
-"""Boxes as domains: the safe set, or a range of time."""
+"""Domains of a search, and boxes as such: the safe set, or a range of time. Trusted: yes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,32 @@ from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.enclosure.objective import Estimate
 
 Range = tuple[Fraction | float, Fraction | float]
+
+
+class Domain(Protocol):
+    """A set of points, known through boxes."""
+
+    def variables(self, needed: tuple[str, ...]) -> tuple[str, ...]:
+        """The variables to search over: those needed, then those that the domain itself depends on."""
+        ...
+
+    def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
+        """Boxes (N, d) that cover the domain's projection to `variables`."""
+        ...
+
+    def contract(
+        self, variables: tuple[str, ...], lo: Array, hi: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Smaller boxes with the same points of the domain, and which of them may contain any."""
+        ...
+
+    def inside(self, variables: tuple[str, ...], points: Array) -> tuple[Array, Array]:
+        """Thin boxes near the given points, each proven to lie in the domain's projection; shape (P', d)."""
+        ...
+
+    def priorities(self, variables: tuple[str, ...], lo: Array, hi: Array, estimate: Estimate) -> Array:
+        """How much splitting each variable promises, (N, d); <= 0 where it cannot be split."""
+        ...
 
 
 class BoxDomain:

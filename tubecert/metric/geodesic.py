@@ -24,6 +24,7 @@ import numpy as np
 from tubecert.coordinates import Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.constant import Constant
+from tubecert.enclosure.domain import Domain
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import (
     congruence,
@@ -34,7 +35,6 @@ from tubecert.enclosure.linalg import (
     whitening,
 )
 from tubecert.enclosure.objective import Estimate, Target
-from tubecert.enclosure.questions import Domain
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO
 

@@ -13,11 +13,10 @@ import numpy as np
 
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
-from tubecert.enclosure.domain import BoxDomain
+from tubecert.enclosure.domain import BoxDomain, Domain
 from tubecert.enclosure.metric_norm import MetricNorm
 from tubecert.enclosure.objective import Objective, SumOfNorms
 from tubecert.enclosure.pencil import Pencil
-from tubecert.enclosure.questions import Domain
 from tubecert.expression import ZERO
 from tubecert.expression.matrix import Matrix, identity
 from tubecert.model import TIME, ControlAffineModel

@@ -14,9 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from tubecert.enclosure.domain import BoxDomain, Range
+from tubecert.enclosure.domain import BoxDomain, Domain, Range
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
-from tubecert.enclosure.questions import Domain
 from tubecert.expression import Expression, constant, symbol
 from tubecert.expression.matrix import Matrix
 from tubecert.model import ControlAffineModel

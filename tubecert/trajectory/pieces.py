@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert.enclosure.domain import Domain
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.objective import Estimate
-from tubecert.enclosure.questions import Domain
 from tubecert.expression import Expression, constant, symbol
 from tubecert.expression.matrix import Matrix
 from tubecert.model import TIME, ControlAffineModel

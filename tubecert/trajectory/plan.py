@@ -13,9 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from tubecert.enclosure.domain import BoxDomain, Range
+from tubecert.enclosure.domain import BoxDomain, Domain, Range
 from tubecert.enclosure.interval import Array, Interval
-from tubecert.enclosure.questions import Domain
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import (
     ZERO,

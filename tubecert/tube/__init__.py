@@ -6,7 +6,7 @@ Trusted: yes. Implements: (omega_norm_ball), (full_tube), assumption 1; theory 1
 """
 
 from tubecert.tube.containment import Containment, containment
-from tubecert.tube.domain import Tube, Tubes
+from tubecert.tube.domain import Tube
 from tubecert.tube.sections import Ball, Ellipsoid, Section
 
-__all__ = ["Ball", "Containment", "Ellipsoid", "Section", "Tube", "Tubes", "containment"]
+__all__ = ["Ball", "Containment", "Ellipsoid", "Section", "Tube", "containment"]

@@ -7,9 +7,6 @@ boxes is ever fixed: a boxed ball would be up to sqrt(n) too wide.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from copy import copy
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,22 +46,6 @@ class Tube:
         self._resting: tuple[Interval, Interval] | None = None  # x* and u* where the plan does not move
         # what was asked for last, of moments and of windows
         self._last: dict[bool, tuple[tuple[Array, Array], tuple[Interval, Interval]]] = {}
-
-    def along(self, plan: Plan) -> Tube:
-        """The same around another plan."""
-        found = copy(self)
-        found._plan, found._resting, found._last = plan, None, {}
-        return found
-
-    @property
-    def radius(self) -> float:
-        """Of a tube of balls.
-
-        Raises `ValueError` for another one.
-        """
-        if not isinstance(self.section, Ball):
-            raise ValueError("no ball")
-        return float(self.section.rho)
 
     def variables(self, needed: tuple[str, ...]) -> tuple[str, ...]:
         """The needed variables, time if the plan moves in them, and the piece of the plan if several inputs jump.
@@ -146,31 +127,26 @@ class Tube:
         return lo, hi, alive & np.all(lo <= hi, axis=1)
 
     def inside(self, variables: tuple[str, ...], points: Array) -> tuple[Array, Array]:
-        """The points, moved into the tube at their time where that can be proven."""
-        lo, hi, ok = self.pulled(variables, self.moved(variables, points))
-        return lo[ok], hi[ok]
+        """The points in the ranges of what is independent of the plan, pulled into the tube of their time.
 
-    def moved(self, variables: tuple[str, ...], points: Array) -> Array:
-        """The points, moved into the ranges of what is independent of the plan; none if that cannot be."""
+        Thin boxes, those that are proven to lie in it; none if the ranges have no point in floats.
+        """
         others = self._others(variables)
         other = [variables.index(v) for v in others]
         moved, _ = self._free.inside(others, points[:, other])
         if len(moved) < len(points):
-            return points[:0]
+            return points[:0], points[:0]
         points = points.copy()
         points[:, other] = moved
-        return self._in_its_piece(variables, points) if PIECE in variables else points
-
-    def pulled(self, variables: tuple[str, ...], points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Thin boxes around the points, pulled towards the plan of their time, and which of them lie in the tube."""
-        points = points.copy()
+        if PIECE in variables:
+            points = self._in_its_piece(variables, points)
         x, u = self._window(variables, points, points)
         state, tied, state_column, tied_column = self._columns(variables)
         centre = self._plan.near(x, state_column, points[:, state])
         points[:, state], ok = self.section.pull(state_column, points[:, state], centre)
         lo, hi = points.copy(), points.copy()
         lo[:, tied], hi[:, tied] = u.lo[:, tied_column], u.hi[:, tied_column]
-        return lo, hi, ok
+        return lo[ok], hi[ok]
 
     def _in_its_piece(self, variables: tuple[str, ...], points: Array) -> Array:
         """The points whose time lies in their piece for certain."""
@@ -235,46 +211,3 @@ class Tube:
         tied = [i for i, v in enumerate(variables) if v in self._inputs]
         which = [self._states.index(variables[i]) for i in state]
         return state, tied, which, [self._inputs.index(variables[i]) for i in tied]
-
-
-class Tubes:
-    """Tubes of balls around parts of one plan, row by row: for searches of one objective over each of them.
-
-    Over a part of the plan the whole plan is what the part is, so only radii and ranges are those of a row's tube.
-    """
-
-    def __init__(self, plan: Plan, tubes: Sequence[Tube]) -> None:
-        self._tubes, self._all = tubes, tubes[0].along(plan)
-        self._radii = np.array([tube.radius for tube in tubes])
-
-    def _of(self, which: NDArray[np.intp]) -> Tube:
-        self._all.section = Ball(self._radii[which])
-        return self._all
-
-    def contract(
-        self, variables: tuple[str, ...], which: NDArray[np.intp], lo: Array, hi: Array
-    ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """As `Tube.contract`."""
-        return self._of(which).contract(variables, lo, hi)
-
-    def inside(
-        self, variables: tuple[str, ...], which: NDArray[np.intp], points: Array
-    ) -> tuple[NDArray[np.intp], tuple[Array, Array]]:
-        """As `Tube.inside`: the rows that are left, and boxes for them."""
-        moved = points.copy()
-        there = np.ones(len(points), dtype=bool)
-        for tube in np.unique(which):
-            rows = np.flatnonzero(which == tube)
-            own = self._tubes[tube].moved(variables, points[rows])
-            there[rows] = len(own) == len(rows)
-            if len(own) == len(rows):
-                moved[rows] = own
-        rows = np.flatnonzero(there)
-        lo, hi, ok = self._of(which[rows]).pulled(variables, moved[rows])
-        return rows[ok], (lo[ok], hi[ok])
-
-    def priorities(
-        self, variables: tuple[str, ...], which: NDArray[np.intp], lo: Array, hi: Array, estimate: Estimate
-    ) -> Array:
-        """As `Tube.priorities`."""
-        return self._of(which).priorities(variables, lo, hi, estimate)

@@ -49,11 +49,10 @@ class Section(Protocol):
 
 
 class Ball:
-    """|x - x*| <= rho; with radii (N,), each row of boxes has its own."""
+    """|x - x*| <= rho."""
 
-    def __init__(self, rho: float | Array) -> None:
+    def __init__(self, rho: float) -> None:
         self.rho = rho
-        self._rho = np.reshape(rho, (-1, 1))  # of a row, or of all
 
     def cut(self, which: list[int], lo: Array, hi: Array, centre: Interval) -> Cut:
         """Every coordinate, by the gaps between box and plan in all others."""
@@ -64,7 +63,7 @@ class Ball:
         square = np.where(np.isfinite(square), square, 0.0)
         # the gaps in all other coordinates: sums of at most 32 terms, each a bound, 32 u < 90 u <= 1e-14
         others = square @ (1.0 - np.eye(lo.shape[1]))
-        room = up(up(np.square(self._rho)) - down(others * (1 - 1e-14)))
+        room = up(up(np.square(self.rho)) - down(others * (1 - 1e-14)))
         alive = np.all(room >= 0, axis=1)
         # a root and a product are rounded, 2 u; 1e-15 > 9 u
         reach = up(np.sqrt(up(np.maximum(room, 0.0))) * (1 + 1e-15))
@@ -76,19 +75,19 @@ class Ball:
         offset = points - centre.mid
         length = np.sqrt(np.sum(offset * offset, axis=1, keepdims=True))
         blur = np.sum(centre.hi - centre.lo + 1e-15 * centre.magnitude, axis=1, keepdims=True)
-        reach = np.maximum(self._rho * _INNER - 2 * blur, 0.0)
+        reach = np.maximum(self.rho * _INNER - 2 * blur, 0.0)
         scale = np.minimum(1.0, reach / np.maximum(length, 1e-300))
         moved = centre.mid + scale * offset
         distance = (Interval.exact(moved) - centre) ** 2
         # a sum of at most 32 terms that are bounds already, as in `cut`
         total = distance.hi.sum(axis=1) * (1 + 1e-14)
-        return moved, total <= down(np.square(self._rho[:, 0]))
+        return moved, total <= down(np.square(self.rho))
 
     def crosses(self, which: list[int], lo: Array, hi: Array, centre: Interval) -> NDArray[np.bool_]:
         """By the farthest corner."""
         del which
         far = np.maximum(np.abs(hi - centre.lo), np.abs(lo - centre.hi))
-        crossing: NDArray[np.bool_] = np.sum(far * far, axis=1) > np.square(self._rho[:, 0])
+        crossing: NDArray[np.bool_] = np.sum(far * far, axis=1) > np.square(self.rho)
         return crossing
 
 
