@@ -23,13 +23,12 @@ from problems import ALIVE, alive
 from test_recheck_formulas import gains_of, proof_of, reading
 
 from tubecert.bounds.constants import ResidualConstants, WindConstants
-from tubecert.conditions import alone, derived, distance, obstacles, predictor, rates, wind
+from tubecert.conditions import alone, distance, obstacles, rates, wind
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.conditions.rates import RateRecipe
 from tubecert.enclosure.interval import Interval
 from tubecert.recheck import conditions, filtering
-from tubecert.recheck import predictor as own_predictor
 from tubecert.recheck.balls import exact
 from tubecert.recheck.kinds import alone as own_alone
 from tubecert.search.distance import recipe_at
@@ -81,7 +80,7 @@ def ends(value: Interval | float) -> tuple[float, float]:
 def of_producer(problem: TubeProblem, gains: RateRecipe, own: DistanceRecipe) -> Told:
     """Every number of the theorems at some gains, enclosed."""
     n, omega = problem.proven(gains.projection_radius), Interval.of(gains.bandwidth)
-    p = predictor.Predictor.of_gain(Interval.of(gains.predictor_gain), omega)
+    g = Interval.of(gains.predictor_gain)
     Y, S, e = map(Interval.of, (own.speed, own.uncertainty, own.prediction_error))
     D = distance.distance_bound(n, omega, S, e)
     low = float(distance.margin_distance_along(problem, [own]).lo[0])
@@ -91,7 +90,7 @@ def of_producer(problem: TubeProblem, gains: RateRecipe, own: DistanceRecipe) ->
         "0: sup D": alone.supremum(n),
         "B: Y": distance.speed_needed(n, S, e),
         "B: S": distance.uncertainty(n, Y, omega),
-        "B: e": distance.error_needed(n, Y, omega, p, Interval.of(gains.adaptation_rate)),
+        "B: e": distance.error_needed(n, Y, omega, g, Interval.of(gains.adaptation_rate)),
         "B: A1": D.ultimate() if stated else np.inf,
         "B: sup D": D.supremum() if stated else np.inf,
         "B: margin": low,
@@ -161,21 +160,18 @@ UNTOLD = {
 }
 OF_PRODUCER = {
     alone: "ultimate supremum",
-    derived: "rate_terms zetas prediction_error filter_error",
-    rates: "rate_margins theta _derived",
-    distance: "drift_bound speed_needed uncertainty filter_error error_needed distance_bound",
+    rates: "rate_terms zetas filter_error rate_margins theta _derived",
+    distance: "drift_bound speed_needed uncertainty filter_error estimation_gain error_needed distance_bound",
     obstacles: "reach",
-    wind: "pushed drifting taken is_felt felt prediction",
-    predictor: "Predictor.of_gain",
+    wind: "pushed drifting taken is_felt felt prediction_error prediction",
 }
 OF_RECHECK = {
     own_alone: "settled supremum _at_the_end",
-    own_predictor: "predictor",
     filtering: "Distance.ultimate",
     conditions: (
         "prediction_error derived margins_26 _error blown_prediction speed_needed distance_bound Setting.still"
         " Setting.pushed Setting.drifting Setting.blown Setting.beside Setting.taken Setting.reach"
-        " Setting.radius_serves"
+        " Setting.radius_serves Setting.predictor"
     ),
 }
 SWAPPED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult}

@@ -15,9 +15,9 @@ from systems import SMALL
 from typer.testing import CliRunner
 
 import tubecert.bounds.start
-import tubecert.conditions.derived
 import tubecert.conditions.kernels
 import tubecert.conditions.rates
+import tubecert.conditions.wind
 import tubecert.enclosure.interval
 import tubecert.expression.calculus
 import tubecert.model
@@ -132,9 +132,9 @@ def narrow_sine(x):
     return tubecert.enclosure.interval.Interval(value.lo * 0.9, value.hi * 0.9)
 
 
-def half_filter_error(n, terms, omega, p):
-    gain = n.DBpx * terms.speed + (omega + p.norm) * n.DBp
-    return gain * tubecert.conditions.derived.prediction_error(terms.hs, terms.s1, p.q)
+def half_filter_error(n, terms, omega, g):
+    gain = n.DBpx * terms.speed + (omega + g) * n.DBp
+    return gain * tubecert.conditions.wind.prediction_error(terms.hs, terms.s1, g)
 
 
 def reduced(value, factor):
@@ -162,7 +162,7 @@ def without_rate(self):
 
 true_slope = tubecert.expression.calculus._slope
 true_sine = tubecert.enclosure.interval.sin
-true_kernel = tubecert.conditions.derived.tight_kernel
+true_kernel = tubecert.conditions.rates.tight_kernel
 true_supremum = tubecert.conditions.kernels._supremum
 true_segment = tubecert.bounds.start.KnownStart.distance
 
@@ -170,7 +170,7 @@ BUGS = {
     "derivative of sin": (tubecert.expression.calculus, "_slope", half_slope, "h_t"),
     "interval sine": (tubecert.enclosure.interval, "sin", narrow_sine, "h"),
     "filter error": (tubecert.conditions.rates, "filter_error", half_filter_error, "A: derived"),
-    "kernel J": (tubecert.conditions.derived, "tight_kernel", small_kernel, "A: derived"),
+    "kernel J": (tubecert.conditions.rates, "tight_kernel", small_kernel, "A: derived"),
     "sup D": (tubecert.conditions.kernels, "_supremum", small_supremum, "A: ultimate|B: sup D"),
     "length of the segment": (
         tubecert.bounds.start.KnownStart,

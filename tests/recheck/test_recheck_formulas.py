@@ -21,6 +21,7 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.recheck.balls import exact
 from tubecert.recheck.conditions import (
     DistanceProof,
+    Gains,
     Numbers,
     Setting,
     WindNumbers,
@@ -33,7 +34,6 @@ from tubecert.recheck.conditions import (
 from tubecert.recheck.filtering import Distance, kappa, tight_kernel
 from tubecert.recheck.kinds import alone
 from tubecert.recheck.kinds.bounds import ultimate
-from tubecert.recheck.predictor import Gains
 
 F = Fraction
 BITS, CLOSE = 160, 1e-25

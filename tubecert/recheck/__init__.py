@@ -21,8 +21,8 @@ formula or rounding in the producer must not pass both.
 | `examines` | every key of a result, and the claim that examines it |
 | `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
-| `wind`, `unknown` | claims about a disturbance, and about parameters of which ranges are known |
-| `filtering`, `predictor`, `conditions` | the theorems A and B at printed numbers |
+| `wind` | claims about a disturbance, and about parameters of which ranges are known |
+| `filtering`, `conditions` | the theorems A and B at printed numbers |
 | `kinds` | the section of each kind of certificate: how it is read, what is examined of it |
 | `claimed`, `planned` | what is claimed, in the certificate's own words; whether a plan is what it should be |
 | `examination`, `consistency`, `refuted` | one claim; what must agree; what refutes |

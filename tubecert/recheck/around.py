@@ -1,6 +1,6 @@
 """What the tube is around one point of the plan: a ball, or an ellipsoid cut to half-widths, as boxes see it.
 
-Offsets are x - x*. For some of the states only, what is known is the projection of the set to these.
+Offsets are x - x*. Asked is about some of the states, `which`: then what is known is the projection of the set to them.
 Implements: theory (0.3), (1.6).
 """
 
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Protocol
 
 from flint import arb
 
@@ -26,34 +25,6 @@ _INNER = 1 - 1e-9
 _TINY = 1e-280
 
 
-class Around(Protocol):
-    """A set of offsets; `which` are the states that are looked at."""
-
-    def extent(self, state: int) -> float:
-        """What one offset can be at most."""
-        ...
-
-    def near(self, which: Sequence[int], offsets: Ranges) -> Ranges | None:
-        """Smaller ranges with the same points of the set; None if there are none."""
-        ...
-
-    def crosses(self, which: Sequence[int], far: Sequence[float]) -> bool:
-        """Whether a box with such largest |offsets| may reach beyond the set; it steers what is split."""
-        ...
-
-    def inside(self, which: Sequence[int], offset: Sequence[Ball]) -> list[Ball] | None:
-        """An offset, moved towards 0 into the projection; None if it could not be shown to lie there."""
-        ...
-
-    def form(self, which: Sequence[int]) -> Rows:
-        """Q with y'Q y <= rho^2 on the projection."""
-        ...
-
-    def directions(self, which: Sequence[int]) -> list[list[float]]:
-        """C with C C' = Q^-1, in floats: a proposal."""
-        ...
-
-
 class Round:
     """|x - x*| <= rho."""
 
@@ -67,7 +38,7 @@ class Round:
         return ceiling(self._rho)
 
     def near(self, which: Sequence[int], offsets: Ranges) -> Ranges | None:
-        """Each by the gaps in all others."""
+        """Smaller ranges with the same points of the set, None if there are none: each by the gaps in all others."""
         del which
         squares = []
         for lo, hi in offsets:
@@ -83,12 +54,12 @@ class Round:
         return found
 
     def crosses(self, which: Sequence[int], far: Sequence[float]) -> bool:
-        """The farthest corner."""
+        """Whether a box with such largest |offsets| may reach beyond the set, by its farthest corner; it steers."""
         del which
         return sum(x * x for x in far) > self._square
 
     def inside(self, which: Sequence[int], offset: Sequence[Ball]) -> list[Ball] | None:
-        """Along the radius."""
+        """An offset moved along the radius into the set; None if it could not be shown to lie there."""
         del which
         size = length(offset)
         scale = 1.0
@@ -98,11 +69,11 @@ class Round:
         return moved if length(moved) <= self._rho else None
 
     def form(self, which: Sequence[int]) -> Rows:
-        """The identity."""
+        """Q with y'Q y <= rho^2 on the projection: the identity."""
         return tuple(tuple(Fraction(i == j) for j in which) for i in which)
 
     def directions(self, which: Sequence[int]) -> list[list[float]]:
-        """The identity."""
+        """C with C C' = Q^-1, in floats: a proposal."""
         return [[float(i == j) for j in which] for i in which]
 
 
@@ -170,6 +141,9 @@ class Ellipsoid:
     def directions(self, which: Sequence[int]) -> list[list[float]]:
         """The block's own factor."""
         return self._form(which).directions
+
+
+Around = Round | Ellipsoid
 
 
 class _Form:

@@ -8,7 +8,6 @@ from functools import cached_property
 
 from flint import arb, ctx
 
-from tubecert.recheck import unknown
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.conditions import USED, Numbers, Setting, WindNumbers
@@ -87,7 +86,7 @@ class Case:
             values = {name: arb("nan") if q is None else exact(q) for name, q in bounds.items()}
             rest = [arb(0), arb(0)]
             if self.system.unknown is not None:  # theory 7: it pushes and drifts as if the plan did
-                rest = [self._ball(name) for name in unknown.CONSTANTS]
+                rest = [self._ball(name) for name in disturbed.OF_UNKNOWN]
                 values["plan_defect_metric"] += rest[0]
                 values["drift_on_plan"] += rest[1]
             return Setting(

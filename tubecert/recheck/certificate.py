@@ -11,7 +11,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from tubecert.recheck import unknown, wind
+from tubecert.recheck import wind
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.document import Members, Node, digest
 from tubecert.recheck.enclosures import Enclosure, enclosure
@@ -285,7 +285,7 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
     if spec.disturbance is not None:
         names += wind.CONSTANTS
     if spec.plant.ranges:
-        names += unknown.CONSTANTS
+        names += wind.OF_UNKNOWN
     own = node.closed(*names)
     return {name: _constant(own[name]) for name in names}
 

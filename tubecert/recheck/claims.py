@@ -18,7 +18,6 @@ from tubecert.recheck import (
     metric,
     planned,
     start,
-    unknown,
 )
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.case import Case
@@ -239,13 +238,13 @@ def _beside(case: Case) -> Iterator[Claim]:
                 (*over, limit, matched),
                 lambda name=name, limit=limit: disturbed.bounded(place, name, limit, matched),  # type: ignore[misc]
             )
-    for name in unknown.CONSTANTS if case.system.unknown is not None else ():
+    for name in disturbed.OF_UNKNOWN if case.system.unknown is not None else ():
         limit = case.bound_if_any(name)
         if limit is not None:
             yield Claim(
                 f"{name} <= {float(limit):.6g}",
                 (*over, limit),
-                lambda name=name, limit=limit: unknown.bounded(place, name, limit),  # type: ignore[misc]
+                lambda name=name, limit=limit: disturbed.unknown_bounded(place, name, limit),  # type: ignore[misc]
             )
 
 

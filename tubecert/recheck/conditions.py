@@ -14,7 +14,6 @@ from flint import arb
 
 from tubecert.recheck.balls import Ball, exact, larger, root, smaller
 from tubecert.recheck.filtering import Distance, tight_kernel
-from tubecert.recheck.predictor import Gains, predictor
 from tubecert.recheck.system import System
 
 _RISES = 100
@@ -49,6 +48,21 @@ class Numbers:
 
 
 USED = tuple(item.name for item in fields(Numbers))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gains:
+    """The gains of A and B: omega, Gamma, the g of A_m = -g I, R_H."""
+
+    bandwidth: Fraction
+    adaptation_rate: Fraction
+    predictor_gain: Fraction
+    projection_radius: Fraction
+
+    @property
+    def sensible(self) -> bool:
+        """Whether all are positive."""
+        return min(self.bandwidth, self.adaptation_rate, self.projection_radius, self.predictor_gain) > 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,21 +136,26 @@ class Setting:
         """T, None for ever."""
         return None if self.system.horizon is None else exact(self.system.horizon)
 
+    def predictor(self, gains: Gains) -> Ball:
+        """g of A_m = -g I; not a number if the gains name another one than the specification, (2.11)-(2.13)."""
+        serves = self.system.predictor_gain in (None, gains.predictor_gain)
+        return exact(gains.predictor_gain) if serves else arb("nan")
+
     def radius_serves(self, R_H: Fraction) -> bool:
         """R_H >= sqrt(1 + nu) Dh, (2.10)."""
         layer = self.system.smooth or Fraction(0)
         return R_H > 0 and bool(exact(R_H * R_H) >= exact(1 + layer) * self.n.h * self.n.h)
 
 
-def prediction_error(n: Numbers, R: Ball, s1: Ball, q: Ball) -> Ball:
-    """Dxt of (2.11), for q > 0."""
-    both = n.h + R
+def prediction_error(n: Numbers, R: Ball, s1: Ball, g: Ball) -> Ball:
+    """Dxt of (2.11), for q = lmin(Q) = 2 g > 0, Q = -(A_m + A_m')."""
+    both, q = n.h + R, 2 * g
     return root(2 * both * s1 / q + both * both) if q > 0 else arb("nan")
 
 
 def derived(setting: Setting, gains: Gains) -> dict[str, Ball]:
     """Everything in (3.1)-(3.5) that the certificate prints, and what (26a)-(26c) need."""
-    s, n = setting.system, setting.n
+    n = setting.n
     lam, rho, omega, R = (
         setting.rate,
         exact(setting.rho),
@@ -144,12 +163,12 @@ def derived(setting: Setting, gains: Gains) -> dict[str, Ball]:
         exact(gains.projection_radius),
     )
     a, A, DB = n.lower, n.upper, n.B
-    p = predictor(s, gains)
+    g = setting.predictor(gains)
     kmax = setting.reach * n.feedback_gain
     Dxdot = n.drift_on_plan + DB * (n.h + R + kmax)  # (3.1)
     s1 = n.h_t + n.h_x * Dxdot  # (3.1)
-    Dxt = prediction_error(n, R, s1, p.q)  # (2.11)
-    Deta = (n.B_pinv_x * Dxdot + n.B_pinv * (2 * omega + p.norm)) * Dxt  # (2.13)
+    Dxt = prediction_error(n, R, s1, g)  # (2.11)
+    Deta = (n.B_pinv_x * Dxdot + n.B_pinv * (2 * omega + g)) * Dxt  # (2.13)
     Dtheta = DB * A * Deta / lam  # (3.2)
     DPsix = 2 * n.B_x + DB * n.M_x / a  # (3.5)
     Dgs = (  # (3.5)
@@ -199,11 +218,11 @@ class DistanceProof:
 
 def _error(setting: Setting, gains: Gains, Y: Ball) -> Ball:
     """Deta(Y)/sqrt(Gamma) of (2.12)."""
-    n, p = setting.n, predictor(setting.system, gains)
+    n, g, omega = setting.n, setting.predictor(gains), exact(gains.bandwidth)
     R, s1, rate = exact(gains.projection_radius), n.h_t + n.h_x * Y, exact(gains.adaptation_rate)
-    gain = n.B_pinv_x * Y + n.B_pinv * (exact(gains.bandwidth) + p.shifted)
+    gain = n.B_pinv_x * Y + n.B_pinv * (omega + abs(omega - g))
     if setting.still:
-        return gain * prediction_error(n, R, s1, p.q) / root(rate)
+        return gain * prediction_error(n, R, s1, g) / root(rate)
     return gain * blown_prediction(setting, gains, R, s1) + setting.taken
 
 
@@ -214,14 +233,14 @@ def blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball:
     q r^2 - 2 zb r = 2 (Dh + R) s1/Gamma; so V <= r^2 + (Dh + R)^2/Gamma. If B is constant, the part of xt in
     the range of B has an equation of its own, with B B^+ E w only.
     """
-    n, p, Gamma = setting.n, predictor(setting.system, gains), exact(gains.adaptation_rate)
+    n, q, Gamma = setting.n, 2 * setting.predictor(gains), exact(gains.adaptation_rate)
     zb = setting.beside
     if not setting.turns:
         zb = smaller(setting.blown, n.B * setting.taken)
     both = n.h + R
-    drag = zb / p.q
-    radius = drag + root(drag * drag + 2 * both * s1 / (p.q * Gamma))
-    return root(both * both / Gamma + radius * radius) if p.q > 0 else arb("nan")
+    drag = zb / q
+    radius = drag + root(drag * drag + 2 * both * s1 / (q * Gamma))
+    return root(both * both / Gamma + radius * radius) if q > 0 else arb("nan")
 
 
 def speed_needed(setting: Setting, R_H: Fraction, error: Ball) -> Ball:

@@ -46,8 +46,7 @@ from tubecert.recheck.terms import (
     turned,
     unit_matrix,
 )
-from tubecert.recheck.unknown import joins
-from tubecert.recheck.wind import added_to, least_sum
+from tubecert.recheck.wind import added_to, joins, least_sum
 
 _ROUND_UP = 1 + Fraction(
     1, 10**15
@@ -78,11 +77,10 @@ def _left_inverse_slopes(fields: Fields) -> list[Matrix]:
 
     For (2.2).
     """
-    B = fields.B
+    B, plain = fields.B, fields.B_pinv
     gram = times(turned(B), B)
     d = determinant(gram)
     inverse = [[e / d for e in row] for row in adjugate(gram)]
-    plain = times(inverse, turned(B))
     beside = plus(unit_matrix(len(B)), times(B, plain), -1)
 
     def along(slope: Matrix) -> Matrix:

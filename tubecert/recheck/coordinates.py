@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
+from tubecert.recheck.metric import adjugate, determinant
 from tubecert.recheck.specified.numbers import Rows
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import (
@@ -119,6 +120,14 @@ class Fields:
     def B(self) -> Matrix:
         """S B, (n, m)."""
         return self.vector(self.system.B)
+
+    @cached_property
+    def B_pinv(self) -> Matrix:
+        """(S B)^+ = (B'B)^-1 B' of the B here, (m, n)."""
+        gram = times(turned(self.B), self.B)
+        d = determinant(gram)
+        inverse = [[e / d for e in row] for row in adjugate(gram)]
+        return times(inverse, turned(self.B))
 
     @property
     def b_x(self) -> list[Matrix]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -23,7 +23,6 @@ from tubecert.recheck.reading import TIME
 from tubecert.recheck.terms import Term, names, number, replaced, slopes, variable
 
 CLOCK = "s#"  # no state can have this name
-SKIPPED = "skipped#"
 SINCE = "since#"
 Ends = list[tuple[float, float]]
 _HALVINGS = 12  # of a part of the plan, until its ranges have bounds
@@ -36,17 +35,6 @@ class Part:
     start: Ball
     length: Ball
     values: dict[str, Ball]
-
-    def during(self, begin: Fraction, end: Fraction) -> Part | None:
-        """What of it may lie between two times: s counts from there on, what went before is `SKIPPED`."""
-        skipped = (exact(begin) - self.start).max(arb(0))
-        if self.values:
-            skipped = skipped.lower()  # a number that s can count from
-        left = ((exact(end) - self.start).min(self.length) - skipped).upper()
-        if left < 0:
-            return None
-        values = {**self.values, SKIPPED: skipped} if self.values else self.values
-        return Part(self.start + skipped, left, values)
 
 
 @dataclass(frozen=True)
@@ -67,19 +55,6 @@ class Curve:
     def somewhere(self) -> list[Ball]:
         """An x* of a plan: x*(0). All others are connected with it."""
         return Program(list(self.start), ()).run([])
-
-    def during(self, begin: Fraction, end: Fraction) -> Curve:
-        """The curve from `begin` to `end`, at its own times; a little more where a part begins or ends at no float.
-
-        Its `start` is that of the whole.
-        """
-        parts = [part for own in self.parts if (part := own.during(begin, end)) is not None]
-        if not parts:
-            raise ValueError("nothing of the curve lies between these times")
-        later = {CLOCK: variable(CLOCK) + (variable(SKIPPED) if parts[0].values else number(begin))}
-        return replace(
-            self, x=tuple(replaced(self.x, later)), u=tuple(replaced(self.u, later)), parts=tuple(parts)
-        )
 
     @cached_property
     def moves(self) -> bool:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
 from flint import arb
 
 from tubecert.recheck.around import Ellipsoid, Round
-from tubecert.recheck.balls import Ball, exact
+from tubecert.recheck.balls import Ball
 from tubecert.recheck.coordinates import Coordinates, Fields
 from tubecert.recheck.cover import Boxed, Outcome, prove
-from tubecert.recheck.curve import CLOCK, SINCE, SKIPPED, Curve, Part, expressed
+from tubecert.recheck.curve import CLOCK, SINCE, Curve, Part, expressed
 from tubecert.recheck.metric import together
 from tubecert.recheck.reading import TIME
 from tubecert.recheck.specified.numbers import Numbers
@@ -27,8 +27,7 @@ from tubecert.recheck.tube import Tube
 class Place:
     """A system with its plan and its tube; `budget` boxes for each claim.
 
-    With `coordinates` S the tube is |S (x - x*)| <= rho, |x_i - x*_i| <= sides_i, else the ball of radius rho. `when`:
-    the times that it is about, where these are not all.
+    With `coordinates` S the tube is |S (x - x*)| <= rho, |x_i - x*_i| <= sides_i, else the ball of radius rho.
     """
 
     system: System
@@ -37,13 +36,6 @@ class Place:
     budget: int
     coordinates: Coordinates | None = None
     sides: Numbers | None = None
-    when: tuple[Fraction, Fraction] | None = None
-
-    def during(self, begin: Fraction, end: Fraction, rho: Fraction) -> Place:
-        """The tube of another radius around a part of the plan; `ValueError` with coordinates of its own."""
-        if self.coordinates is not None or self.sides is not None:
-            raise ValueError("a part of a tube has no coordinates")
-        return replace(self, curve=self.curve.during(begin, end), rho=rho, when=(begin, end))
 
     @cached_property
     def fields(self) -> Fields:
@@ -62,13 +54,10 @@ class Place:
             return Round(self.rho)
         return Ellipsoid(self.coordinates, self.rho, self.sides)
 
-    def tube(self, extra: dict[str, tuple[Fraction, Fraction]] | None = None) -> Tube:
+    def tube(self) -> Tube:
         """The tube, with the times that matter for h."""
-        s = self.system
-        time = s.times
-        if time is not None and self.when is not None:
-            time = self.when
-        free = {**self.curve.ranges, **s.ranges, **(extra or {}), **({} if time is None else {TIME: time})}
+        s, time = self.system, self.system.times
+        free = {**self.curve.ranges, **s.ranges, **({} if time is None else {TIME: time})}
         return Tube(self.curve, self.around, s.states, s.inputs, free)
 
     def on_plan(self, rows: Rows) -> Matrix:
@@ -79,17 +68,15 @@ class Place:
 
     @property
     def _clock(self) -> dict[str, Term]:
-        """The time in f by the s of the plan: since a knot, or since what is looked at of a plan of one part begins."""
+        """The time in f by the s of the plan: since a knot, or since a plan of one part begins."""
         if TIME not in names(e for row in self.system.f for e in row):
             return {}
         parts = self.curve.parts
         if all(SINCE in part.values for part in parts):
-            since = variable(SINCE) + variable(CLOCK)
-            return {TIME: since if self.when is None else since + variable(SKIPPED)}
-        begin = Fraction(0) if self.when is None else self.when[0]
-        if not (len(parts) == 1 and not parts[0].values and parts[0].start.overlaps(exact(begin))):
+            return {TIME: variable(SINCE) + variable(CLOCK)}
+        if not (len(parts) == 1 and not parts[0].values and parts[0].start.is_zero()):
             raise ValueError("f depends on t along a plan whose times are not known")
-        return {TIME: variable(CLOCK) + number(begin)}
+        return {TIME: variable(CLOCK)}
 
     def around_plan(self, rows: Rows) -> Matrix:
         """A matrix in s and in x - x*, for every part of a plan: the tube stays there, whatever the plan does."""
@@ -107,11 +94,6 @@ class Place:
             if not outcomes[-1].holds:
                 break
         return together(outcomes)
-
-    def ball(self) -> Tube:
-        """The tube in s and in x - x*, of a plan of one part."""
-        (part,) = self.curve.parts
-        return self._ball_of(part)
 
     def _ball_of(self, part: Part) -> Tube:
         """The tube around one part, in its s and in x - x*."""

@@ -33,8 +33,7 @@ from tubecert.recheck.terms import (
     variable,
 )
 from tubecert.recheck.tube import Tube
-from tubecert.recheck.unknown import joins
-from tubecert.recheck.wind import adapted
+from tubecert.recheck.wind import adapted, joins
 
 _PIECES = (1, 16, 128, 1024, 4096)
 _SHARES = 12

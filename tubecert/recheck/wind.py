@@ -1,62 +1,78 @@
-"""Claims about a disturbance E(x) w: how it pushes, how fast it moves, what of it the inputs explain.
+"""Claims about what acts beside f and the inputs: a disturbance E(x) w, and parameters of f of which a range is known.
 
-With a rate, E stands for (I - B B^+) E, and B^+ E w is a part of h. Written from theory 7; everything in the
-coordinates of the tube, where E is S E and B^+ is (S B)^+.
+f is that of the middles; what is not known of it is f(x, theta) - f(x). Of both, what B^+ makes of them is what inputs
+can make: with a rate of w, and always of the drift, it is a part of h. v - B B^+ v is beside the inputs: with a rate,
+E stands for that. Written from theory 7; everything in the coordinates of the tube, where E is S E and B^+ is (S B)^+;
+theta is a variable of every test.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 
 from tubecert.recheck.branches import norms_below
-from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Domain, Outcome, prove
-from tubecert.recheck.metric import adjugate, determinant, stated
+from tubecert.recheck.identity import vanish
+from tubecert.recheck.metric import stated
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.hardware import Disturbance
 from tubecert.recheck.statements import PositiveDefinite
-from tubecert.recheck.terms import Matrix, all_zero, names, plus, scaled, times, turned
+from tubecert.recheck.terms import NOUGHT, Matrix, all_zero, names, plus, scaled, times, turned
 
 CONSTANTS = ("wind_push", "wind_size", "wind_explained")
+OF_UNKNOWN = ("residual_push", "residual_size")
 
 _HALVINGS, _FINE = 20, 60  # of a limit; of one that is no supremum
 _FIRST = 4_000  # boxes for each share of a limit
 
 
-@dataclass(frozen=True)
-class Blown:
-    """E in the coordinates of a tube, and its parts."""
-
-    wind: Disturbance
-    fields: Fields
-
-    @cached_property
-    def explained(self) -> Matrix:
-        """B^+ E, (m, k), (7.1)."""
-        B = self.fields.B
-        gram = times(turned(B), B)
-        d = determinant(gram)
-        inverse = [[e / d for e in row] for row in adjugate(gram)]
-        return times(times(inverse, turned(B)), self.fields.vector(self.wind.E))
-
-    @cached_property
-    def E(self) -> Matrix:
-        """What is not adapted to: E, or (I - B B^+) E where there is a rate."""
-        return self.rest if self.wind.rate is not None else self.fields.vector(self.wind.E)
-
-    @cached_property
-    def rest(self) -> Matrix:
-        """(I - B B^+) E: what no input reaches."""
-        return plus(self.fields.vector(self.wind.E), times(self.fields.B, self.explained), -1)
-
-
-def blown(place: Place) -> Blown:
-    """The disturbance at a place; `ValueError` where there is none."""
+def _wind(place: Place) -> Disturbance:
+    """The disturbance; `ValueError` where there is none."""
     if place.system.wind is None:
         raise ValueError("the specification has no disturbance")
-    return Blown(place.system.wind, place.fields)
+    return place.system.wind
+
+
+def _explained(place: Place) -> Matrix:
+    """B^+ E, (m, k), (7.1)."""
+    return times(place.fields.B_pinv, place.fields.vector(_wind(place).E))
+
+
+def _beside(place: Place) -> Matrix:
+    """(I - B B^+) E: what no input reaches."""
+    return plus(place.fields.vector(_wind(place).E), times(place.fields.B, _explained(place)), -1)
+
+
+def _pushing(place: Place) -> Matrix:
+    """What is not adapted to: E, or (I - B B^+) E where there is a rate."""
+    wind = _wind(place)
+    return _beside(place) if wind.rate is not None else place.fields.vector(wind.E)
+
+
+def _unknown_drift(place: Place) -> Matrix | None:
+    """f(x, theta) - f(x), (n, 1); None if all of f is known."""
+    s = place.system
+    return None if s.unknown is None else place.fields.vector(plus(s.unknown, s.f, -1))
+
+
+def joins(place: Place) -> Matrix | None:
+    """What of it is a part of h, (m, 1), (7.1); None if f is known."""
+    drift = _unknown_drift(place)
+    return None if drift is None else times(place.fields.B_pinv, drift)
+
+
+def unknown_bounded(place: Place, name: str, limit: Fraction) -> Outcome:
+    """Whether one of `OF_UNKNOWN` is at most `limit`: of what no input reaches; what is proven to vanish is 0."""
+    drift, known = _unknown_drift(place), joins(place)
+    if drift is None or known is None:
+        raise ValueError("every parameter is known")
+    if limit < 0:
+        return stated(False, "it is negative")
+    left = plus(drift, times(place.fields.B, known), -1)
+    rest = [[NOUGHT if vanish([e]) else e] for (e,) in left]
+    if name == OF_UNKNOWN[0]:
+        return _metric_norm(place, rest, limit)
+    return _norm(rest, limit, place.tube(), place.budget)
 
 
 def bounded(place: Place, name: str, limit: Fraction, matched: Fraction | None) -> Outcome:
@@ -64,24 +80,27 @@ def bounded(place: Place, name: str, limit: Fraction, matched: Fraction | None) 
     if limit < 0:
         return stated(False, "it is negative")
     if name == CONSTANTS[0]:
-        return push(place, limit, matched)
-    return size(place, limit) if name == CONSTANTS[1] else explained(place, limit)
+        return _push(place, limit, matched)
+    if name == CONSTANTS[1]:
+        return _norm(_pushing(place), limit, place.tube(), place.budget)
+    if _wind(place).rate is not None:  # nothing is left of it where it is adapted to
+        return stated(limit >= 0, "it is negative")
+    return _norm(_explained(place), limit, place.tube(), place.budget)
 
 
-def push(place: Place, limit: Fraction, matched: Fraction | None) -> Outcome:
+def _push(place: Place, limit: Fraction, matched: Fraction | None) -> Outcome:
     """|g'M E| <= limit for a unit geodesic g: smax(Theta E), or `matched` (beta eps_w) with that of (I - B B^+) E.
 
     (7.2).
     """
-    own = blown(place)
-    found = metric_norm(place, own.E, limit)
-    if found.holds or matched is None or own.wind.rate is not None:
+    found = _metric_norm(place, _pushing(place), limit)
+    if found.holds or matched is None or _wind(place).rate is not None:
         return found
-    apart = metric_norm(place, own.rest, limit - matched)
+    apart = _metric_norm(place, _beside(place), limit - matched)
     return apart if apart.holds else found
 
 
-def metric_norm(place: Place, E: Matrix, limit: Fraction) -> Outcome:
+def _metric_norm(place: Place, E: Matrix, limit: Fraction) -> Outcome:
     """|Theta E| <= limit: limit^2 W >= E E', (7.2)."""
     if all_zero(E):
         return stated(limit >= 0, "it is negative")
@@ -92,20 +111,7 @@ def metric_norm(place: Place, E: Matrix, limit: Fraction) -> Outcome:
     return prove(PositiveDefinite(S, W), place.tube(), place.budget)
 
 
-def size(place: Place, limit: Fraction) -> Outcome:
-    """|E| <= limit."""
-    return norm(blown(place).E, limit, place.tube(), place.budget)
-
-
-def explained(place: Place, limit: Fraction) -> Outcome:
-    """|B^+ E| <= limit; nothing is left of it where it is adapted to."""
-    own = blown(place)
-    if own.wind.rate is not None:
-        return stated(limit >= 0, "it is negative")
-    return norm(own.explained, limit, place.tube(), place.budget)
-
-
-def norm(a: Matrix, limit: Fraction, domain: Domain, budget: int) -> Outcome:
+def _norm(a: Matrix, limit: Fraction, domain: Domain, budget: int) -> Outcome:
     """|a| <= limit."""
     if limit < 0:
         return stated(False, "it is negative")
@@ -119,7 +125,7 @@ def adapted(place: Place) -> Matrix | None:
     wind = place.system.wind
     if wind is None or wind.rate is None:
         return None
-    return scaled(wind.length, blown(place).explained)
+    return scaled(wind.length, _explained(place))
 
 
 def added_to(place: Place, name: str) -> list[Matrix]:
@@ -133,7 +139,7 @@ def added_to(place: Place, name: str) -> list[Matrix]:
     elif name == "h":
         found = [more]
     else:
-        found = [scaled(wind.rate, blown(place).explained)]
+        found = [scaled(wind.rate, _explained(place))]
     return [a for a in found if not all_zero(a)]
 
 

@@ -6,11 +6,10 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from tubecert.recheck.balls import Ball, exact, root
-from tubecert.recheck.conditions import DistanceProof, Setting, distance_bound
+from tubecert.recheck.conditions import DistanceProof, Gains, Setting, distance_bound
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.enclosures import Enclosure
 from tubecert.recheck.metric import CONFIRMED, stated
-from tubecert.recheck.predictor import Gains
 
 
 def all_of(outcomes: Iterable[Outcome]) -> Outcome:

@@ -10,7 +10,14 @@ from typing import ClassVar
 from flint import arb
 
 from tubecert.recheck.balls import Ball, exact
-from tubecert.recheck.conditions import DistanceProof, Setting, distance_bound, margin, own_distance_proof
+from tubecert.recheck.conditions import (
+    DistanceProof,
+    Gains,
+    Setting,
+    distance_bound,
+    margin,
+    own_distance_proof,
+)
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
@@ -28,7 +35,6 @@ from tubecert.recheck.kinds.bounds import (
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
 from tubecert.recheck.kinds.printed import GAINS, read_gains
 from tubecert.recheck.metric import stated
-from tubecert.recheck.predictor import Gains
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from tubecert.recheck.conditions import Gains
 from tubecert.recheck.document import Members, Node
 from tubecert.recheck.enclosures import enclosure
 from tubecert.recheck.kinds.kind import Shortfall
-from tubecert.recheck.predictor import Gains
 
 GAINS = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from tubecert.recheck.conditions import Setting, derived, margins_26, own_distance_proof
+from tubecert.recheck.conditions import Gains, Setting, derived, margins_26, own_distance_proof
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.document import Node
 from tubecert.recheck.enclosures import Enclosure, enclosure
@@ -26,7 +26,6 @@ from tubecert.recheck.kinds.bounds import (
 from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
 from tubecert.recheck.kinds.printed import GAINS, read_gains
 from tubecert.recheck.metric import stated
-from tubecert.recheck.predictor import Gains
 
 CONDITIONS = ("26a", "26b", "26c")
 DERIVED = (
