@@ -17,7 +17,7 @@ from tubecert.bounds import linear
 from tubecert.bounds.suprema import Suprema
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.recheck import linear as again
+from tubecert.recheck import norms as again
 from tubecert.recheck.coordinates import Coordinates as OwnCoordinates
 from tubecert.recheck.curve import expressed
 from tubecert.recheck.place import Place

@@ -24,8 +24,8 @@ from mutants_of_loop import ROOT, certificate_text, certify, files, load, load_t
 import tampers  # isort: skip
 
 from tubecert.recheck.document import CertificateError
+from tubecert.recheck.grammar import spelled
 from tubecert.recheck.run import recheck
-from tubecert.recheck.spelling import spelled
 from tubecert.sampled_loop.record import Claim, of_json
 from tubecert.sampled_loop.theorem import check
 from tubecert.simulation.sampled.campaign import simulate

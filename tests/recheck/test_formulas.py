@@ -28,7 +28,7 @@ from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.conditions.rates import RateRecipe
 from tubecert.enclosure.interval import Interval
-from tubecert.recheck import conditions, filtering
+from tubecert.recheck import conditions
 from tubecert.recheck.balls import exact
 from tubecert.recheck.kinds import alone as own_alone
 from tubecert.search.distance import recipe_at
@@ -167,10 +167,9 @@ OF_PRODUCER = {
 }
 OF_RECHECK = {
     own_alone: "settled supremum _at_the_end",
-    filtering: "Distance.ultimate",
     conditions: (
         "prediction_error derived margins_26 _error blown_prediction speed_needed distance_bound Setting.still"
-        " Setting.pushed Setting.drifting Setting.blown Setting.beside Setting.taken Setting.reach"
+        " Distance.ultimate Setting.pushed Setting.drifting Setting.blown Setting.beside Setting.taken Setting.reach"
         " Setting.radius_serves Setting.predictor"
     ),
 }

@@ -7,11 +7,10 @@ import pytest
 import rechecked
 
 from tubecert.recheck import constants
-from tubecert.recheck.blocks import blocks
 from tubecert.recheck.curve import expressed
 from tubecert.recheck.norms import norms
 from tubecert.recheck.place import Place
-from tubecert.recheck.terms import NOUGHT, number
+from tubecert.recheck.terms import NOUGHT, blocks, number
 
 NAMES = ("x", "y", "z")
 RHO = Fraction(1, 2)

@@ -17,11 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import texts
 
-from tubecert.recheck import boxes, expansion, monomials, pencils, statements
+from tubecert.recheck import boxes, monomials, pencils, statements
 from tubecert.recheck.balls import is_positive
 from tubecert.recheck.boxes import Field, Found
-from tubecert.recheck.clock import telling
-from tubecert.recheck.cover import Boxed, prove
+from tubecert.recheck.cover import Boxed, prove, telling
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.pencils import SlopesBelow
 from tubecert.recheck.statements import NormsBelow, PositiveDefinite
@@ -263,17 +262,17 @@ def by_trace(a):
 
 
 true_written, true_divisor = monomials._written, monomials._divisor
-true_weight, true_vertices, true_positive = Field._weight, expansion.Expansion.vertices, is_positive
+true_weight, true_vertices, true_positive = Field._weight, boxes.Expansion.vertices, is_positive
 
 BROKEN = {
     "sin^2 = 2 - cos^2": ("monomials", monomials, "_written", without_cosines),
     "powers of divisors": ("monomials", monomials, "_divisor", one_divisor),
     "no third derivatives": ("expansion", Field, "_weight", no_radius),
     "nothing is left": ("expansion", Field, "_variation", lambda *_: iter(())),
-    "no mixed derivatives": ("norms", expansion.Expansion, "vertices", unmixed),
-    "a parabola between its ends": ("norms", expansion, "CURVED", ((-1.0, 1.0), (1.0, 1.0))),
-    "one corner": ("norms", expansion.Expansion, "vertices", one_side),
-    "one corner of a symmetric matrix": ("definiteness", expansion.Expansion, "vertices", one_side),
+    "no mixed derivatives": ("norms", boxes.Expansion, "vertices", unmixed),
+    "a parabola between its ends": ("norms", boxes, "CURVED", ((-1.0, 1.0), (1.0, 1.0))),
+    "one corner": ("norms", boxes.Expansion, "vertices", one_side),
+    "one corner of a symmetric matrix": ("definiteness", boxes.Expansion, "vertices", one_side),
     "trace and determinant": ("signs", sys.modules[__name__], "is_positive", by_trace),
     "trace and determinant on a box": ("definiteness", statements, "is_positive", by_trace),
 }

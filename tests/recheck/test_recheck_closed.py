@@ -20,8 +20,8 @@ from tubecert import pipeline, spec
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.expression.text import number_text
 from tubecert.recheck.document import _SHORT, Node
+from tubecert.recheck.grammar import spelled
 from tubecert.recheck.run import recheck
-from tubecert.recheck.spelling import spelled
 
 PLAN = "trajectory: {kind: equilibrium, at: [0, 0], input: [0]}"
 START = "initial_state: {at: [0.05, 0]}"

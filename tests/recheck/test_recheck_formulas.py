@@ -20,6 +20,7 @@ from systems import SMALL
 from tubecert.conditions.problem import TubeProblem
 from tubecert.recheck.balls import exact
 from tubecert.recheck.conditions import (
+    Distance,
     DistanceProof,
     Gains,
     Numbers,
@@ -27,11 +28,12 @@ from tubecert.recheck.conditions import (
     WindNumbers,
     derived,
     distance_bound,
+    kappa,
     margin,
     margins_26,
     own_distance_proof,
+    tight_kernel,
 )
-from tubecert.recheck.filtering import Distance, kappa, tight_kernel
 from tubecert.recheck.kinds import alone
 from tubecert.recheck.kinds.bounds import ultimate
 

@@ -361,7 +361,7 @@ def test_a_defect_that_vanishes_by_an_addition_theorem_is_confirmed():
 def test_a_defect_that_is_not_proven_to_vanish_is_undecided(monkeypatch):
     """No more is concluded where the addition theorems do not reach."""
     document = wiggling()
-    monkeypatch.setattr("tubecert.recheck.angles._MULTIPLE", 0)
+    monkeypatch.setattr("tubecert.recheck.identity._MULTIPLE", 0)
     found = examine(document, memory={})
     verdicts = {claim.outcome.verdict for claim in found.claims if "plan_defect" in claim.name}
     assert verdicts == {"undecided"}
@@ -416,7 +416,7 @@ def test_a_slip_in_the_addition_theorems_is_caught(slip, monkeypatch):
         "quarter": ("_Parts._is_pi", lambda self, monomial: True),
     }
     name, broken = slips[slip]
-    monkeypatch.setattr(f"tubecert.recheck.angles.{name}", broken)
+    monkeypatch.setattr(f"tubecert.recheck.identity.{name}", broken)
     failed = 0
     for text in ADDED:
         try:

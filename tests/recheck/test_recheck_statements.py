@@ -25,12 +25,11 @@ from tubecert.bounds.suprema import Suprema
 from tubecert.errors import ExitCode
 from tubecert.recheck import boxes, pencils
 from tubecert.recheck.boxes import Field
-from tubecert.recheck.branches import norms_below
 from tubecert.recheck.claims import of_certified
 from tubecert.recheck.constants import _left_inverse_slopes, largest_push
 from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import Boxed, prove
-from tubecert.recheck.lipschitz import LipschitzBelow
+from tubecert.recheck.lipschitz import LipschitzBelow, norms_below
 from tubecert.recheck.pencils import GainBelow
 from tubecert.recheck.run import recheck
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite

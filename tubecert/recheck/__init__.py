@@ -9,23 +9,21 @@ formula or rounding in the producer must not pass both.
 | `balls` | ball arithmetic: exact numbers, ends, norms, positive definite matrices |
 | `grammar`, `terms`, `program` | text to terms with derivative rules of this room's own; evaluated on balls |
 | `monomials` | the same as exact combinations of monomials: a whole matrix with its derivatives by one product |
-| `identity`, `angles` | terms that vanish identically, by polynomials over the rationals and the addition theorems |
-| `boxes`, `expansion` | what terms can be on a box: polynomials of second order, their vertices, and what they leave |
+| `identity` | terms that vanish identically, by polynomials over the rationals and the addition theorems |
+| `boxes` | what terms can be on a box: polynomials of second order, their vertices, and what they leave |
 | `statements` | norms, definiteness and signs at those vertices |
-| `pencils`, `multiplier`, `branches`, `lipschitz` | statements of other kinds: pencils, columns over a ball, kinks |
+| `pencils`, `multiplier`, `norms`, `lipschitz` | statements of other kinds: pencils, columns over a ball, kinks |
 | `cover` | a claim over a domain, by splitting boxes that cover it |
-| `curve`, `tube` | the plan as segments that enclose it; boxes around it |
-| `document`, `spelling`, `reading` | JSON and expressions, read and checked for form |
+| `curve`, `tube` | the plan as segments that enclose it, or a family of plans; boxes around it |
+| `document`, `specified.numbers` | JSON and expressions, read and checked for form |
 | `specification` with its parts in `specified`, `certificate` | closed types of all that a certificate may say |
-| `plans`, `enclosures`, `reasons` | their parts |
+| `plans`, `reasons` | their parts; whether a plan is what it should be |
 | `examines` | every key of a result, and the claim that examines it |
 | `system`, `times` | the system that a specification describes; the times that matter for h |
 | `metric`, `place`, `constants`, `start`, `geodesics` | claims about the metric, suprema, the start |
 | `wind` | claims about a disturbance, and about parameters of which ranges are known |
-| `filtering`, `conditions` | the theorems A and B at printed numbers |
+| `conditions` | the theorems A and B at printed numbers |
 | `kinds` | the section of each kind of certificate: how it is read, what is examined of it |
-| `claimed`, `planned` | what is claimed, in the certificate's own words; whether a plan is what it should be |
-| `examination`, `consistency`, `refuted` | one claim; what must agree; what refutes |
+| `examination`, `consistency`, `refuted` | one claim; what must agree, and what is claimed; what refutes |
 | `claims` | all claims in their order |
-| `uncontrollable` | the mode of the linearisation that leaves no metric |
 """

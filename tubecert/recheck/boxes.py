@@ -2,24 +2,30 @@
 
 On a box with centre c and radii r, d = x - c: G(x) = G(c) + sum d_i G_i(c) + 1/2 sum d_i d_j G_ij(c) + rest with
 |rest| <= 1/6 sum r_i r_j r_k sup|G_ijk|, or 1/2 sum r_i r_j sup|G_ij - G_ij(c)| where third derivatives are too many.
-The polynomial is examined at its vertices (`expansion`); where those are too many, s_i = d_i^2 is r_i^2/2 +- r_i^2/2.
+The polynomial is examined at its vertices; where those are too many, s_i = d_i^2 is r_i^2/2 +- r_i^2/2.
 Variables in which every entry is affine are replaced by their ends, exactly. A norm is smooth where it is not 0; on
 a box on which it may be: mean value form, then natural extension. A table is smooth where a box meets no knot of it;
 elsewhere its function has a Lipschitz gradient, so that it is expanded to second order, its derivative to first.
+
+Polynomials of second order over a box, and vertices whose hull contains their values.
+
+A polynomial in d_i/r_i with d = x - c is affine in every pair (d_i, s_i), s_i = d_i^2, and the pair lies in the hull of
+(-r, r^2), (-r/2, 0), (r/2, 0), (r, r^2) (edges: tangents of the parabola, and its chord). Norms and largest eigenvalues
+are convex, so products of these vertices are all there is to examine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import combinations_with_replacement, product
 from math import factorial, prod
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, between, magnitude
-from tubecert.recheck.expansion import Expansion
 from tubecert.recheck.lookup import smooth_on
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
@@ -34,6 +40,76 @@ from tubecert.recheck.terms import (
     slopes,
     table_of,
 )
+
+Vertices: TypeAlias = tuple[tuple[float, float], ...]  # pairs (d, s)
+
+STRAIGHT: Vertices = ((-1.0, 0.0), (1.0, 0.0))
+CURVED: Vertices = ((-1.0, 1.0), (-0.5, 0.0), (0.5, 0.0), (1.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Expansion:
+    """Entries near the centre of a box as a polynomial in d_i/r_i; `rest` bounds what is left of each of them.
+
+    `steps[i]` belongs to d_i/r_i, `squares[i]` to (d_i/r_i)^2, `mixed` to products of two different ones. Every
+    coefficient is a matrix of one shape, by default a column; `rest` lists its entries row by row.
+    """
+
+    value: arb_mat
+    steps: list[arb_mat]
+    squares: dict[int, arb_mat]
+    mixed: dict[tuple[int, int], arb_mat]
+    rest: list[Ball]
+
+    def mapped(self, linear: Callable[[arb_mat], arb_mat]) -> Expansion:
+        """A linear map of the polynomial; the rest is left as it is."""
+        return Expansion(
+            linear(self.value),
+            [linear(step) for step in self.steps],
+            {i: linear(square) for i, square in self.squares.items()},
+            {ij: linear(product) for ij, product in self.mixed.items()},
+            self.rest,
+        )
+
+    def vertices(self) -> Iterator[list[Ball]]:
+        """The entries of the polynomial, row by row, at points whose hull contains all its values."""
+        parts = [self.value, *self.steps, *self.squares.values(), *self.mixed.values()]
+        monomials = _at_vertices(len(self.steps), tuple(self.squares), tuple(self.mixed), CURVED)
+        count = monomials.ncols()
+        coefficients = [x for row in zip(*(part.entries() for part in parts), strict=True) for x in row]
+        found = (arb_mat(len(coefficients) // len(parts), len(parts), coefficients) * monomials).entries()
+        return (found[k::count] for k in range(count))
+
+    def corners(self) -> Iterator[arb_mat]:
+        """The same as matrices."""
+        shape = self.value.nrows(), self.value.ncols()
+        return (arb_mat(*shape, entries) for entries in self.vertices())
+
+    def ranges(self) -> list[Ball]:
+        """An enclosure of every entry."""
+        value = self.value.entries()
+        sizes = [e.entries() for e in (*self.steps, *self.mixed.values())]
+        squares = [q.entries() for q in self.squares.values()]
+        found = []
+        for k, r in enumerate(self.rest):
+            size = sum((magnitude(e[k]) for e in sizes), start=r)
+            total = value[k] + between(-size, size)
+            found.append(sum((between(0, q[k]) for q in squares), start=total))
+        return found
+
+
+@cache
+def _at_vertices(
+    count: int, squared: tuple[int, ...], mixed: tuple[tuple[int, int], ...], curved: Vertices
+) -> arb_mat:
+    """1, d_i, s_i and d_i d_j (rows) at products of vertices (columns): exact numbers."""
+    choices = [curved if i in squared else STRAIGHT for i in range(count)]
+    columns = [
+        [1.0, *(d for d, _ in at), *(at[i][1] for i in squared), *(at[i][0] * at[j][0] for i, j in mixed)]
+        for at in product(*choices)
+    ]
+    return arb_mat([list(row) for row in zip(*columns, strict=True)])
+
 
 Box = Sequence[tuple[float, float]]
 Values = Mapping[str, Ball]

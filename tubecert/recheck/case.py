@@ -13,8 +13,7 @@ from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.conditions import USED, Numbers, Setting, WindNumbers
 from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.curve import Curve
-from tubecert.recheck.document import digest
-from tubecert.recheck.enclosures import Enclosure
+from tubecert.recheck.document import Enclosure, digest
 from tubecert.recheck.examination import SHARP
 from tubecert.recheck.place import Place
 from tubecert.recheck.result import INFIMA, MEASURED, MetricSection, Result, Sections, TubeSection

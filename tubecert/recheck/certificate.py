@@ -13,8 +13,7 @@ from typing import Any
 
 from tubecert.recheck import wind
 from tubecert.recheck.coordinates import Coordinates
-from tubecert.recheck.document import Members, Node, digest
-from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.document import Enclosure, Members, Node, digest, enclosure
 from tubecert.recheck.examines import not_examined
 from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.inputs import read_limited
@@ -38,10 +37,9 @@ from tubecert.recheck.result import (
 )
 from tubecert.recheck.specification import Specification, read_specification
 from tubecert.recheck.specified.loop import DECIDES
-from tubecert.recheck.specified.metric import Wanted, read_wanted
 from tubecert.recheck.specified.numbers import Range, Rows
-from tubecert.recheck.specified.plant import Plant
-from tubecert.recheck.specified.start import read_start
+from tubecert.recheck.specified.plant import Plant, Wanted, read_wanted
+from tubecert.recheck.specified.trajectory import read_start
 
 NOT_HASHED = ("notes", "run")
 """Members of a certificate beside its result: what they say is not examined."""

@@ -10,32 +10,31 @@ from typing import Any
 from flint import arb
 
 from tubecert.recheck import (
-    claimed,
     clearances,
     consistency,
     geodesics,
     inputs,
     metric,
-    planned,
     start,
 )
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.case import Case
 from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width, largest_push
-from tubecert.recheck.cover import Outcome
+from tubecert.recheck.cover import Outcome, stated, together
 from tubecert.recheck.examination import SHARP, Claim
 from tubecert.recheck.kinds.kind import Ground, Kind, Section
 from tubecert.recheck.kinds.table import KINDS
-from tubecert.recheck.reading import TIME
+from tubecert.recheck.plans import serves
 from tubecert.recheck.result import INFIMA, Result
-from tubecert.recheck.specified.metric import Metric
+from tubecert.recheck.specified.numbers import TIME
+from tubecert.recheck.specified.plant import Metric
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 
 
 def of_every(result: Result) -> Iterator[Claim]:
     """What every certificate says of itself, whatever its verdict."""
     yield Claim("the specification and what repeats it", None, lambda: consistency.specification(result))
-    yield Claim("the claim is that of the specification", None, lambda: claimed.agrees(result))
+    yield Claim("the claim is that of the specification", None, lambda: consistency.claimed(result))
     yield Claim("bounds are intervals", None, lambda: consistency.bounds(result))
 
 
@@ -74,7 +73,7 @@ def _on_set(case: Case) -> Iterator[Claim]:
     yield Claim(
         "C1 has bounds on the safe set",
         (lower is None, upper is None),
-        lambda: metric.stated(None not in (lower, upper), "there are none"),
+        lambda: stated(None not in (lower, upper), "there are none"),
     )
     yield from _declared(case)
     yield Claim("C3: the Killing condition", whole, lambda: metric.killing(s))
@@ -83,7 +82,7 @@ def _on_set(case: Case) -> Iterator[Claim]:
         yield Claim(
             f"C2 on the safe set at rate {float(s.rate):.6g} + {float(most):.4g}",
             (*whole, most),
-            lambda: metric.contraction(s, most, budget) if most > 0 else metric.stated(False, "no margin"),
+            lambda: metric.contraction(s, most, budget) if most > 0 else stated(False, "no margin"),
         )
 
 
@@ -121,7 +120,7 @@ def _smooth(case: Case) -> Outcome:
     if not isinstance(trajectory, Expressed):
         return found
     along = metric.smooth(trajectory.duties, {TIME: (Fraction(0), trajectory.horizon)}, case.budget)
-    return metric.together([found, along])
+    return together([found, along])
 
 
 def _tube(case: Case) -> Iterator[Claim]:
@@ -131,7 +130,7 @@ def _tube(case: Case) -> Iterator[Claim]:
         yield Claim(
             "the plan serves its task",
             (*case.whole, case.knots),
-            lambda: planned.serves(trajectory, plan),
+            lambda: serves(trajectory, plan),
             SHARP,
         )
     yield Claim(
@@ -155,7 +154,7 @@ def _radius(case: Case) -> Outcome:
     """Rho holds both radii, and where these are asked for, what the start needs as well."""
     width = case.tube.epsilon + case.tube.rho_a
     if case.result.specification.half_widths:
-        return metric.stated(width <= case.place.rho, "it is smaller than epsilon + rho_a")
+        return stated(width <= case.place.rho, "it is smaller than epsilon + rho_a")
     return start.radius(case.place, width, case.bound("lower"), case.bound("upper"))
 
 
@@ -218,7 +217,7 @@ def _constants(case: Case) -> Iterator[Claim]:
             lambda: (
                 geodesics.unique(place, value)
                 if value is not None and value < 1
-                else metric.stated(False, "the test is not below 1")
+                else stated(False, "the test is not below 1")
             ),
         )
 
@@ -274,7 +273,7 @@ def _inputs(case: Case, kind: Kind[Any, Any], ground: Ground) -> Iterator[Claim]
             f"{kind.key}: what is added to u*",
             (tuple(bounds.items()), section, recipe),
             lambda: (
-                metric.stated(False, "it has no recipe")
+                stated(False, "it has no recipe")
                 if recipe is None
                 else inputs.added(kind.shares(section, recipe, ground), bounds)
             ),
@@ -284,4 +283,4 @@ def _inputs(case: Case, kind: Kind[Any, Any], ground: Ground) -> Iterator[Claim]
 def _silent(section: Section, missing: str) -> Outcome:
     """A section that is not certified, and names why."""
     named = any(item.condition == missing for item in section.shortfalls)
-    return metric.stated(named and section.verdict != "certified", f"{missing} is not named")
+    return stated(named and section.verdict != "certified", f"{missing} is not named")

@@ -12,10 +12,8 @@ from itertools import chain, pairwise
 from math import isfinite
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor, root
-from tubecert.recheck.clock import time_is_up
-from tubecert.recheck.cover import Outcome, prove
+from tubecert.recheck.cover import CONFIRMED, Outcome, prove, stated, time_is_up, together
 from tubecert.recheck.curve import Curve, Segment
-from tubecert.recheck.metric import CONFIRMED, stated, together
 from tubecert.recheck.obstacles import Cleared, Obstacle, Point, Shape
 from tubecert.recheck.place import Place
 from tubecert.recheck.statements import NotNegative

@@ -1,6 +1,11 @@
 """What the parts of a certificate say about one another, compared exactly: no arithmetic beyond equality.
 
 The statements of assumptions are part of the claim: they must be those of this format, one by one.
+
+The claim in the certificate's own words, derived again from this room's reading of the specification.
+
+`claim`: the state stays within the tube around the plan, over which time (and why for all of it, if there is no
+horizon), on which set the metric is one, from which start, against which uncertainty.
 """
 
 from __future__ import annotations
@@ -8,18 +13,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tubecert.recheck import clearances, inputs
-from tubecert.recheck.cover import Outcome
-from tubecert.recheck.enclosures import Enclosure
+from tubecert.recheck.cover import CONFIRMED, Outcome, stated
+from tubecert.recheck.document import Enclosure
 from tubecert.recheck.kinds.table import KINDS
-from tubecert.recheck.metric import CONFIRMED, stated
 from tubecert.recheck.reasons import Assumption
-from tubecert.recheck.result import Geodesics, Result, TubeSection
+from tubecert.recheck.result import Claim, Geodesics, Plans, Result, TubeSection, Wind
 from tubecert.recheck.specification import Specification
-from tubecert.recheck.specified.hardware import Disturbance
-from tubecert.recheck.specified.loop import LETTERS
-from tubecert.recheck.specified.metric import Metric, Wanted
-from tubecert.recheck.specified.trajectory import Planned, Tabled
+from tubecert.recheck.specified.loop import LETTERS, Disturbance
+from tubecert.recheck.specified.plant import Metric, Wanted
+from tubecert.recheck.specified.trajectory import AnyPlan, Planned, Resting, Tabled
 from tubecert.recheck.system import System
+from tubecert.recheck.times import period_of
 
 _CLAIMS_ONLY = "the verdict is certified, but"
 _CURVE = "hermite"  # between knots x* is the cubic whose slopes at its ends are f(x*) + B(x*) u*
@@ -241,3 +245,54 @@ def _first(statements: Iterator[tuple[bool, str]]) -> Outcome:
         if not holds:
             return stated(False, why)
     return CONFIRMED
+
+
+TUBE = "tube"
+_KEYS = (
+    "id",
+    "horizon",
+    "for_all_time",
+    "period",
+    "domain",
+    "start",
+    "uncertainty",
+    "plans",
+    "wind",
+    "parameters",
+)
+
+
+def own_claim(spec: Specification) -> Claim:
+    """What a certificate of this specification claims; raises `ValueError` where it can claim nothing."""
+    horizon = spec.trajectory.horizon
+    for_all_time = period = None
+    if horizon is None:
+        assert isinstance(spec.trajectory, (Resting, AnyPlan)), "every other plan has a horizon"
+        found = period_of(spec.uncertainty, spec.plant.moving)
+        for_all_time = "periodic" if found.length else "autonomous"
+        period = found.text if found.length else None
+    return Claim(
+        id=TUBE,
+        horizon=horizon,
+        for_all_time=for_all_time,
+        period=period,
+        domain=spec.plant.safe_set,
+        start=spec.start,
+        uncertainty=spec.uncertainty.words,
+        plans=_plans(spec.trajectory) if isinstance(spec.trajectory, AnyPlan) else None,
+        wind=None if spec.disturbance is None else Wind(spec.disturbance.length, spec.disturbance.rate),
+        parameters=spec.plant.ranges or None,
+    )
+
+
+def _plans(family: AnyPlan) -> Plans:
+    return Plans(x=family.x, u=family.u, defect=family.defect)
+
+
+def claimed(result: Result) -> Outcome:
+    """Whether `claim` is what follows from the specification."""
+    own = own_claim(result.specification)
+    for key in _KEYS:
+        if getattr(own, key) != getattr(result.claim, key):
+            return stated(False, f"claim.{key} is not that of the specification")
+    return stated(True, "")

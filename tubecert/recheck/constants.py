@@ -11,32 +11,24 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from tubecert.recheck.balls import ceiling, exact, root, sharp_norm
-from tubecert.recheck.blocks import blocks
 from tubecert.recheck.boxes import Test
-from tubecert.recheck.branches import norms_below, slopes_below
 from tubecert.recheck.coordinates import Fields
-from tubecert.recheck.cover import Boxed, Outcome, prove
-from tubecert.recheck.family import Everyone
+from tubecert.recheck.cover import Boxed, Outcome, prove, stated, together
+from tubecert.recheck.curve import Everyone
 from tubecert.recheck.identity import vanish
-from tubecert.recheck.lipschitz import LipschitzBelow
-from tubecert.recheck.metric import (
-    adjugate,
-    determinant,
-    lower_bound,
-    stated,
-    together,
-    upper_bound,
-)
+from tubecert.recheck.lipschitz import LipschitzBelow, norms_below, slopes_below
+from tubecert.recheck.metric import adjugate, determinant, lower_bound, upper_bound
 from tubecert.recheck.norms import norms
 from tubecert.recheck.pencils import GainBelow, SlopesBelow
 from tubecert.recheck.place import Place
-from tubecert.recheck.reading import TIME
+from tubecert.recheck.specified.numbers import TIME
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.terms import (
     NOUGHT,
     Matrix,
     Term,
     all_zero,
+    blocks,
     in_order,
     matrix_replaced,
     number,

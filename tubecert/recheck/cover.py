@@ -2,21 +2,64 @@
 
 What is split first is heuristic; a box is left only when the statement is proven on it, or when it is proven to
 contain no point of the domain. A point of the domain at which the statement is proven false contradicts it.
+
+A claim ends, undecided, when the time of an examination is up; somebody may be told how far it is.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from fractions import Fraction
+from math import inf
 from typing import Any, Literal, Protocol
 
 from flint import arb
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
 from tubecert.recheck.boxes import Found, Test
-from tubecert.recheck.clock import time_is_up, told
+
+Told = Callable[
+    [int, float], None
+]  # how many boxes were examined of a claim, and which share of it is proven
+
+_END: ContextVar[float] = ContextVar("end", default=inf)
+_TOLD: ContextVar[Told | None] = ContextVar("told", default=None)
+
+
+@contextmanager
+def within(seconds: float | None) -> Iterator[None]:
+    """What is examined in this context ends so many seconds from now; None: when it is done."""
+    token = _END.set(inf if seconds is None else time.monotonic() + seconds)
+    try:
+        yield
+    finally:
+        _END.reset(token)
+
+
+def time_is_up() -> bool:
+    """Whether the end has passed."""
+    return time.monotonic() > _END.get()
+
+
+@contextmanager
+def telling(told: Told | None) -> Iterator[None]:
+    """`told` hears how far what is examined in this context is."""
+    token = _TOLD.set(told)
+    try:
+        yield
+    finally:
+        _TOLD.reset(token)
+
+
+def told() -> Told | None:
+    """Who hears it."""
+    return _TOLD.get()
+
 
 _TRIES = 4  # every so many boxes a point is tried
 _TELLS = 64  # ... it is told how far the claim is
@@ -37,6 +80,24 @@ class Outcome:
     def holds(self) -> bool:
         """Whether the claim is confirmed."""
         return self.verdict == "confirmed"
+
+
+CONFIRMED = Outcome(verdict="confirmed")
+
+
+def together(outcomes: Sequence[Outcome]) -> Outcome:
+    """Several claims as one: the first that is contradicted, else the first that is undecided."""
+    boxes = sum(item.boxes for item in outcomes)
+    for verdict in ("contradicted", "undecided"):
+        for item in outcomes:
+            if item.verdict == verdict:
+                return Outcome(verdict=verdict, why=item.why, boxes=boxes)
+    return Outcome(verdict="confirmed", boxes=boxes)
+
+
+def stated(holds: bool, why: str) -> Outcome:
+    """A comparison of exact numbers or texts."""
+    return CONFIRMED if holds else Outcome(verdict="contradicted", why=why)
 
 
 class Domain(Protocol):

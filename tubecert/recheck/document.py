@@ -10,6 +10,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
@@ -17,8 +18,7 @@ from typing import Any, TypeVar
 
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding, Location
-from tubecert.recheck.grammar import GrammarError, read_number
-from tubecert.recheck.spelling import LONGEST, spelled
+from tubecert.recheck.grammar import LONGEST, GrammarError, read_number, spelled
 
 FORMAT = "tubecert-certificate/3"
 SAMPLED_LOOP = "tubecert-sampled-loop/1"
@@ -315,3 +315,27 @@ def digest(data: Any) -> str:
     """The hash of the canonical bytes: UTF-8, sorted keys, no spaces."""
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return "sha256:" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Enclosure:
+    """[below, above]; None where there is no bound."""
+
+    below: Fraction | None
+    above: Fraction | None
+
+    @property
+    def is_interval(self) -> bool:
+        """Whether its ends, as far as there are any, are in order."""
+        return self.below is None or self.above is None or self.below <= self.above
+
+
+def maybe(node: Node) -> Fraction | None:
+    """A number, or null."""
+    return None if node.value is None else node.number()
+
+
+def enclosure(node: Node) -> Enclosure:
+    """[below, above]; either may be null."""
+    low, high = node.pair()
+    return Enclosure(maybe(low), maybe(high))

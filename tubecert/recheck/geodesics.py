@@ -16,9 +16,8 @@ from flint import arb, arb_mat
 from tubecert.recheck.balls import Ball, exact, spectral_norm
 from tubecert.recheck.boxes import Box, Field, Found
 from tubecert.recheck.coordinates import Fields
-from tubecert.recheck.cover import Outcome, prove
+from tubecert.recheck.cover import Outcome, prove, stated, together
 from tubecert.recheck.curve import Segment
-from tubecert.recheck.metric import stated, together
 from tubecert.recheck.place import Place
 from tubecert.recheck.terms import all_zero
 

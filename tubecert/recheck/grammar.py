@@ -249,3 +249,32 @@ def _bits(term: Term) -> int:
     q = number_of(term) if term.op == "const" else NOUGHT.value
     assert isinstance(q, Fraction)
     return max(q.numerator.bit_length(), q.denominator.bit_length())
+
+
+LONGEST = 40  # characters of a number
+_PLAIN_DIGITS = 25  # longer ones have an exponent
+_ZEROS = 4  # so many at least are worth one
+
+
+def spelled(q: Fraction) -> str:
+    """The text that stands for q; a reader of it needs no rule of arithmetic."""
+    sign, size = "-" if q < 0 else "", abs(q)
+    short = _short_decimal(size)
+    return sign + (short if short is not None and len(short) <= LONGEST else str(size))
+
+
+def _short_decimal(q: Fraction) -> str | None:
+    """The decimal, if it is finite."""
+    below = q.denominator
+    places = next((k for k in range(below.bit_length() + 1) if 10**k % below == 0), None)
+    if places is None:
+        return None
+    digits = str(q.numerator * 10**places // below)
+    if places > _PLAIN_DIGITS:
+        return f"{digits}e-{places}"
+    if places:
+        digits = digits.zfill(places + 1)
+        return f"{digits[:-places]}.{digits[-places:]}"
+    short = digits.rstrip("0")
+    zeros = len(digits) - len(short)
+    return f"{short}e{zeros}" if len(digits) > _PLAIN_DIGITS and zeros >= _ZEROS else digits

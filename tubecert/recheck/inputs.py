@@ -10,13 +10,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Node
-from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.cover import Outcome, stated, together
+from tubecert.recheck.document import Enclosure, Node, enclosure
 from tubecert.recheck.kinds.bounds import all_of, at_most
 from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements
 from tubecert.recheck.kinds.table import KEYS
-from tubecert.recheck.metric import stated, together
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.numbers import Range
 from tubecert.recheck.statements import NotNegative

@@ -10,11 +10,11 @@ from fractions import Fraction
 from itertools import combinations, islice
 
 from tubecert.recheck.balls import exact
-from tubecert.recheck.cover import Boxed, Domain, Outcome, Range, prove
+from tubecert.recheck.cover import CONFIRMED, Boxed, Domain, Outcome, Range, prove, stated, together
 from tubecert.recheck.grammar import Owed
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.program import Program
-from tubecert.recheck.reading import TIME
+from tubecert.recheck.specified.numbers import TIME
 from tubecert.recheck.statements import NotNegative, PositiveDefinite
 from tubecert.recheck.system import System, along
 from tubecert.recheck.terms import (
@@ -34,22 +34,6 @@ from tubecert.recheck.terms import (
 _MINORS = 200
 _SHORT = 4  # columns up to which det B is written out
 _MOST_MINORS = 5_000  # of one determinant: those of 12 dense rows
-CONFIRMED = Outcome(verdict="confirmed")
-
-
-def together(outcomes: Sequence[Outcome]) -> Outcome:
-    """Several claims as one: the first that is contradicted, else the first that is undecided."""
-    boxes = sum(item.boxes for item in outcomes)
-    for verdict in ("contradicted", "undecided"):
-        for item in outcomes:
-            if item.verdict == verdict:
-                return Outcome(verdict=verdict, why=item.why, boxes=boxes)
-    return Outcome(verdict="confirmed", boxes=boxes)
-
-
-def stated(holds: bool, why: str) -> Outcome:
-    """A comparison of exact numbers or texts."""
-    return CONFIRMED if holds else Outcome(verdict="contradicted", why=why)
 
 
 def lower_bound(s: System, a: Fraction, domain: Domain, budget: int, unit: Rows | None = None) -> Outcome:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations, pairwise
 
-from tubecert.recheck.document import Node
-from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.document import Enclosure, Node, enclosure
 
 Point = tuple[Fraction, Fraction]
 

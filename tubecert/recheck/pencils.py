@@ -22,8 +22,7 @@ from tubecert.recheck.balls import (
     proposed_largest,
     whitening,
 )
-from tubecert.recheck.boxes import Box, Field, Found
-from tubecert.recheck.expansion import Expansion
+from tubecert.recheck.boxes import Box, Expansion, Field, Found
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.quotients import cancelled
 from tubecert.recheck.statements import PositiveDefinite, definite_on, square, weights

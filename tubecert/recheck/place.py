@@ -12,11 +12,9 @@ from flint import arb
 from tubecert.recheck.around import Ellipsoid, Round
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.coordinates import Coordinates, Fields
-from tubecert.recheck.cover import Boxed, Outcome, prove
+from tubecert.recheck.cover import Boxed, Outcome, prove, together
 from tubecert.recheck.curve import CLOCK, SINCE, Curve, Part, expressed
-from tubecert.recheck.metric import together
-from tubecert.recheck.reading import TIME
-from tubecert.recheck.specified.numbers import Numbers
+from tubecert.recheck.specified.numbers import TIME, Numbers
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import Matrix, Rows, Term, matrix_replaced, names, number, variable

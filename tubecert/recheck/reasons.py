@@ -9,8 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.document import Members, Node
-from tubecert.recheck.enclosures import enclosure, maybe
+from tubecert.recheck.document import Members, Node, enclosure, maybe
 from tubecert.recheck.kinds.kind import VERDICTS
 from tubecert.recheck.kinds.table import CONDITIONS
 from tubecert.recheck.specified.numbers import Numbers

@@ -2,29 +2,50 @@
 
 A verdict `refuted` names a claim and, where there is one, a point: the claim is evaluated there. That gains are
 refuted rests on the lower sides of the constants, which are not examined. A verdict `undecided` claims nothing.
+
+Why there is no metric: a mode of the linearisation that no input reaches bounds the rate. Exact but for the roots.
+
+Where f(x) + B(x) u = 0, C3 makes the projected C2 that of the linear system (A, B), A = f_x + sum_j u_j (b_j)_x.
+With Z a basis of the left null space of [B, AB, ..., A^(n-1) B] and Z A = A_c Z: for A_c'p = s p, v = Z'p has B'v = 0,
+and C2 in direction v says 2 (Re s + rate) v'Wv <= 0. So no metric has the rate if some Re s > -rate. f, B and their
+slopes must be rational at the point; the roots of the characteristic polynomial of A_c are enclosed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from typing import Any
 
-from flint import arb, ctx
+from flint import arb, ctx, fmpq, fmpq_mat
 
-from tubecert.recheck import metric, start, uncontrollable
+from tubecert.recheck import metric, start
 from tubecert.recheck.balls import Ball, exact, floor, is_indefinite
 from tubecert.recheck.case import Case
-from tubecert.recheck.cover import Outcome
+from tubecert.recheck.cover import CONFIRMED, Outcome, stated
 from tubecert.recheck.curve import Segment
 from tubecert.recheck.examination import SHARP, Claim
 from tubecert.recheck.kinds.table import KEYS
-from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.program import Program
 from tubecert.recheck.reasons import Reason
 from tubecert.recheck.result import Result, TubeSection
-from tubecert.recheck.specified.metric import Metric
-from tubecert.recheck.specified.trajectory import AnyPlan
-from tubecert.recheck.terms import Matrix, Rows, plus, scaled, times, turned, unit_matrix
+from tubecert.recheck.specification import Specification
+from tubecert.recheck.specified.numbers import upright
+from tubecert.recheck.specified.plant import Metric, Plant, Wanted
+from tubecert.recheck.specified.trajectory import AnyPlan, Planned, Resting
+from tubecert.recheck.terms import (
+    Matrix,
+    Rows,
+    matrix_replaced,
+    matrix_slopes,
+    number,
+    number_of,
+    plus,
+    scaled,
+    times,
+    turned,
+    unit_matrix,
+)
 
 _AT_A_POINT = ("metric_definite", "metric_contraction", "metric_killing", "metric_bound")
 
@@ -55,7 +76,7 @@ def of_others(case: Case) -> Iterator[Claim]:
 def _refutation(case: Case, reason: Reason) -> Outcome:
     name, result, at = reason.claim, case.result, reason.at
     if name == "metric_found":
-        return uncontrollable.excludes(result.specification)
+        return excludes(result.specification)
     if not isinstance(result.specification.metric, Metric):
         return Outcome(verdict="undecided", why="refutations of this kind are not examined")
     if name in _AT_A_POINT and at is not None:
@@ -74,7 +95,7 @@ def _metric_fails(case: Case, name: str, point: list[Ball]) -> Outcome:
     """A condition on the metric is false at the witness."""
     s = case.system
     if len(point) != len(s.states) or not _inside(case, point):
-        return metric.stated(False, "the witness does not lie in the safe set")
+        return stated(False, "the witness does not lie in the safe set")
     if name == "metric_bound":
         return _if(any(is_indefinite(_value(case, rows, point)) for rows in _declared_bounds(case)))
     if name == "metric_definite":
@@ -120,7 +141,7 @@ def _value(case: Case, rows: Rows, point: list[Ball]) -> list[list[Ball]]:
 def _leaves(case: Case, at: Fraction | None) -> Outcome:
     """The plan comes closer to a face of the safe set than the radius, near the time of the witness."""
     if case.result.tube is None:
-        return metric.stated(False, "no radius is stated")
+        return stated(False, "no radius is stated")
     if case.result.specification.coordinates:
         return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
     s, own = case.system, _least_radius(case, case.result.tube)
@@ -155,7 +176,7 @@ def _plan_exceeds(case: Case, name: str, at: Fraction | None) -> Outcome:
     """u* of the plan is beyond a limit near the time of the witness; of a family nothing of the kind is known."""
     spec, inputs = case.result.specification, case.system.inputs
     if name not in spec.limits or isinstance(spec.trajectory, AnyPlan):
-        return metric.stated(False, "it is no input with limits, or of no known plan")
+        return stated(False, "it is no input with limits, or of no known plan")
     low, high = spec.limits[name]
     _, _, u = _near(case, at).middle()
     value = u[inputs.index(name)]
@@ -167,10 +188,88 @@ def _gains_fail(result: Result, name: str) -> Outcome:
     assert result.sections is not None
     section = result.sections.by_key[name]
     if section.verdict == "certified":
-        return metric.stated(False, "the section is certified")
+        return stated(False, "the section is certified")
     ends = [item.margin.above for item in section.shortfalls]
     refused = any(end is not None and exact(end) <= arb(0) for end in ends)
     why = "the shortfalls rest on the lower sides of constants, which are not examined"
-    return (
-        Outcome(verdict="undecided", why=why) if refused else metric.stated(False, "no shortfall is stated")
+    return Outcome(verdict="undecided", why=why) if refused else stated(False, "no shortfall is stated")
+
+
+def excludes(spec: Specification) -> Outcome:
+    """Whether the rate that the specification asks for is excluded at one of the points that suggest themselves."""
+    plant = spec.plant
+    if not isinstance(spec.metric, Wanted) or spec.metric.rate is None:
+        return Outcome(verdict="undecided", why="no rate is asked for")
+    for point in _points(spec):
+        if all(low <= x <= high for x, (low, high) in zip(point, plant.safe_set.values(), strict=True)):
+            linear = _linearised(plant, point)
+            if linear is not None and _has_slow_mode(*linear, spec.metric.rate):
+                return CONFIRMED
+    return Outcome(verdict="undecided", why="no uncontrollable mode was found that excludes the rate")
+
+
+def _points(spec: Specification) -> Iterator[Sequence[Fraction]]:
+    """Rational points that may be equilibria: the plan's, its target, the centre of the set, the origin."""
+    trajectory = spec.trajectory
+    if isinstance(trajectory, Resting):
+        yield trajectory.at
+    if isinstance(trajectory, Planned):
+        yield trajectory.target
+    yield [(low + high) / 2 for low, high in spec.plant.safe_set.values()]
+    yield [Fraction(0)] * len(spec.plant.states)
+
+
+def _linearised(plant: Plant, point: Sequence[Fraction]) -> tuple[fmpq_mat, fmpq_mat] | None:
+    """(A, B) at a point, if it is a (forced) equilibrium and everything is rational there."""
+    values = {name: number(q) for name, q in zip(plant.states, point, strict=True)}
+
+    def rational(rows: Rows) -> fmpq_mat | None:
+        there: Matrix = matrix_replaced(rows, values)
+        if any(e.op != "const" for row in there for e in row):
+            return None
+        entries = [number_of(e) for row in there for e in row]
+        return fmpq_mat(len(rows), len(rows[0]), [fmpq(q.numerator, q.denominator) for q in entries])
+
+    drift = upright(plant.f)
+    f, B = rational(drift), rational(plant.B)
+    slopes = [[rational(matrix_slopes(rows, name)) for name in plant.states] for rows in (drift, plant.B)]
+    if f is None or B is None or any(column is None for columns in slopes for column in columns):
+        return None
+    n, m = B.nrows(), B.ncols()
+    gram = B.transpose() * B
+    if gram.rank() < m:
+        return None
+    u = gram.solve(B.transpose() * f) * fmpq(-1)
+    if f + B * u != fmpq_mat(n, 1):
+        return None
+    columns = [f_k + B_k * u for f_k, B_k in zip(*slopes, strict=True)]
+    return fmpq_mat(n, n, [columns[k][i, 0] for i in range(n) for k in range(n)]), B
+
+
+def _has_slow_mode(A: fmpq_mat, B: fmpq_mat, rate: Fraction) -> bool:
+    """Whether some uncontrollable mode s has Re s > -rate."""
+    n = A.nrows()
+    blocks = [B]
+    for _ in range(n - 1):
+        blocks.append(A * blocks[-1])
+    reached = fmpq_mat(n * B.ncols(), n, [e for block in blocks for e in block.transpose().entries()])
+    echelon, rank = reached.rref()
+    leading = [next(j for j in range(n) if echelon[i, j] != 0) for i in range(rank)]
+    free = [j for j in range(n) if j not in leading]
+    if not free:
+        return False
+    # rows z with z [B, AB, ...] = 0: one for each free column, 1 there and 0 at the others
+    Z = fmpq_mat(
+        len(free),
+        n,
+        [
+            -echelon[leading.index(j), k] if j in leading else fmpq(int(j == k))
+            for k in free
+            for j in range(n)
+        ],
     )
+    image = Z * A
+    A_c = fmpq_mat(len(free), len(free), [image[i, k] for i in range(len(free)) for k in free])
+    assert image == A_c * Z, "the left null space of the controllability matrix is invariant"
+    roots: Any = A_c.charpoly().complex_roots()  # with multiplicities, which flint's types do not say
+    return any(bool(s.real + exact(rate) > 0) for s, _ in roots)

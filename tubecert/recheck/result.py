@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.enclosures import Enclosure
+from tubecert.recheck.document import Enclosure
 from tubecert.recheck.inputs import Limited
 from tubecert.recheck.kinds.kind import Asked, Section
 from tubecert.recheck.obstacles import Cleared
 from tubecert.recheck.plans import Plan
 from tubecert.recheck.reasons import Assumption, Reason
 from tubecert.recheck.specification import Specification
-from tubecert.recheck.specified.metric import Wanted
 from tubecert.recheck.specified.numbers import Range, Rows
-from tubecert.recheck.specified.start import Start
+from tubecert.recheck.specified.plant import Wanted
+from tubecert.recheck.specified.trajectory import Start
 
 MEASURED = (
     "lower",

@@ -11,11 +11,9 @@ from tubecert.recheck import refuted
 from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.claims import of_certified, of_every
-from tubecert.recheck.clock import telling, time_is_up, within
-from tubecert.recheck.cover import Outcome
+from tubecert.recheck.cover import Outcome, stated, telling, time_is_up, within
 from tubecert.recheck.document import SAMPLED_LOOP, Node, read
 from tubecert.recheck.examination import Claim, Memory
-from tubecert.recheck.metric import stated
 from tubecert.recheck.result import Certificate
 from tubecert.recheck.sampled_loop import claims as sampled_loop
 from tubecert.recheck.sampled_loop.record import NOT_EXAMINED

@@ -12,22 +12,30 @@ from typing import TypeVar
 
 from tubecert.recheck.document import Members, Node, digest, wrong
 from tubecert.recheck.obstacles import Obstacle, read_obstacle
-from tubecert.recheck.specified.hardware import (
+from tubecert.recheck.specified.loop import (
     Disturbance,
     Hardware,
+    Loop,
     read_disturbance,
     read_hardware,
+    read_loop,
 )
-from tubecert.recheck.specified.idle import IDLE, read_idle
-from tubecert.recheck.specified.loop import Loop, read_loop
-from tubecert.recheck.specified.metric import Metric, Wanted, read_metric
-from tubecert.recheck.specified.numbers import Range, ends, positive
-from tubecert.recheck.specified.plant import Plant, Uncertainty, read_plant, read_uncertainty
-from tubecert.recheck.specified.start import Start, read_start
+from tubecert.recheck.specified.numbers import TIME, Range, Reader, ends, positive, several
+from tubecert.recheck.specified.plant import (
+    Metric,
+    Plant,
+    Uncertainty,
+    Wanted,
+    read_metric,
+    read_plant,
+    read_uncertainty,
+)
 from tubecert.recheck.specified.trajectory import (
     AnyPlan,
+    Start,
     Trajectory,
     read_lasting,
+    read_start,
     read_trajectory,
 )
 from tubecert.recheck.times import period_of
@@ -201,3 +209,35 @@ def _some(node: Node, names: Sequence[str], reads: Callable[[Node], T]) -> dict[
 
 def _widths(node: Node) -> dict[str, Fraction]:
     return {name: positive(value) for name, value in node.items()}
+
+
+IDLE = ("name", "expect", "simulation", "obstacles", "limits")
+_LOCKED = ("rho", "clearance", "inputs", "bandwidth", "adaptation_rate", "largest_rate")
+
+
+def read_idle(own: Members, plant: Plant) -> None:
+    """Known keys all the same."""
+    if "expect" in own:
+        locked = own["expect"].closed(optional=("verdict", "metric", "half_widths", *_LOCKED))
+        for key in ("verdict", "metric"):
+            locked.get(key, Node.text)
+        for key in _LOCKED:
+            locked.get(key, lambda item: several(item, 2))
+        if "half_widths" in locked:
+            widths = locked["half_widths"].closed(optional=plant.lengths)
+            for key in plant.lengths:
+                widths.get(key, lambda item: several(item, 2))
+    if "simulation" in own:
+        numbers, texts = ("runs", "seed", "duration"), ("controllers", "plane", "h")
+        simulation = own["simulation"].closed(optional=("gains", *numbers, *texts))
+        simulation.get("gains", Node.text)
+        simulation.get(
+            "h",
+            lambda item: Reader.of((*plant.states, TIME), plant.tables, kinks=True).column(
+                item, len(plant.inputs)
+            ),
+        )
+        for key in numbers:
+            simulation.get(key, Node.exact)
+        for key in texts:
+            simulation.get(key, Node.texts)

@@ -13,14 +13,13 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.around import Round
 from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root, sharp_norm
-from tubecert.recheck.branches import norms_below
-from tubecert.recheck.cover import Boxed, Outcome, prove
+from tubecert.recheck.cover import CONFIRMED, Boxed, Outcome, prove, stated, together
 from tubecert.recheck.curve import Curve, Part
-from tubecert.recheck.metric import CONFIRMED, lower_bound, stated, together, upper_bound
+from tubecert.recheck.lipschitz import norms_below
+from tubecert.recheck.metric import lower_bound, upper_bound
 from tubecert.recheck.place import Place
 from tubecert.recheck.program import Program
-from tubecert.recheck.reading import TIME
-from tubecert.recheck.specified.numbers import Numbers, Range
+from tubecert.recheck.specified.numbers import TIME, Numbers, Range
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import (
     NOUGHT,

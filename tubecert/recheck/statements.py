@@ -12,8 +12,7 @@ from fractions import Fraction
 from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, Balls, exact, is_indefinite, is_positive, spectral_norm, whitening
-from tubecert.recheck.boxes import Box, Field, Found, Values
-from tubecert.recheck.expansion import Expansion
+from tubecert.recheck.boxes import Box, Expansion, Field, Found, Values
 from tubecert.recheck.program import Program
 from tubecert.recheck.quotients import cancelled
 from tubecert.recheck.terms import Rows, Term

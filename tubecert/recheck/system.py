@@ -10,17 +10,14 @@ from itertools import pairwise
 
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.cover import Range as CoverRange
-from tubecert.recheck.curve import Curve, Knots, expressed, hermite
+from tubecert.recheck.curve import Curve, Knots, everyone, expressed, hermite
 from tubecert.recheck.document import wrong
-from tubecert.recheck.family import everyone
 from tubecert.recheck.grammar import Owed
 from tubecert.recheck.plans import Plan
-from tubecert.recheck.reading import TIME, upright
 from tubecert.recheck.specification import Specification
-from tubecert.recheck.specified.hardware import Disturbance
-from tubecert.recheck.specified.metric import Metric
-from tubecert.recheck.specified.numbers import Numbers, Range
-from tubecert.recheck.specified.plant import Uncertainty
+from tubecert.recheck.specified.loop import Disturbance
+from tubecert.recheck.specified.numbers import TIME, Numbers, Range, upright
+from tubecert.recheck.specified.plant import Metric, Uncertainty
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Resting, Trajectory
 from tubecert.recheck.terms import (
     Matrix,

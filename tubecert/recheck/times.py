@@ -12,7 +12,7 @@ from flint import arb
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.cover import Range
 from tubecert.recheck.grammar import PI
-from tubecert.recheck.reading import TIME
+from tubecert.recheck.specified.numbers import TIME
 from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.terms import Term, in_order, names, number_of, slopes
 

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from tubecert.recheck.branches import norms_below
-from tubecert.recheck.cover import Domain, Outcome, prove
+from tubecert.recheck.cover import Domain, Outcome, prove, stated
 from tubecert.recheck.identity import vanish
-from tubecert.recheck.metric import stated
+from tubecert.recheck.lipschitz import norms_below
 from tubecert.recheck.place import Place
-from tubecert.recheck.specified.hardware import Disturbance
+from tubecert.recheck.specified.loop import Disturbance
 from tubecert.recheck.statements import PositiveDefinite
 from tubecert.recheck.terms import NOUGHT, Matrix, all_zero, names, plus, scaled, times, turned
 

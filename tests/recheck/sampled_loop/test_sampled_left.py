@@ -8,8 +8,8 @@ import pytest
 from flint import arb, arb_mat
 from sampled_files import CART, SCALAR, changed, made, why_not
 
+from tubecert.recheck.cover import CONFIRMED
 from tubecert.recheck.document import Node, read
-from tubecert.recheck.metric import CONFIRMED
 from tubecert.recheck.plans import Knots, Plan
 from tubecert.recheck.sampled_loop.claims import Case
 from tubecert.recheck.sampled_loop.loop import Loop

@@ -7,7 +7,6 @@ The keys are those of `tubecert.kinds`, from which nothing is imported. A new ki
 | module | what it is |
 |---|---|
 | `kind` | what every kind offers, and what its claims rest on |
-| `printed` | members that several kinds have: gains, points of a curve, margins, what is missing |
 | `bounds` | printed numbers against those of this room |
 | `alone`, `rates`, `distance` | 0, A and B |
 """

@@ -9,14 +9,11 @@ from typing import ClassVar
 
 from tubecert.recheck.balls import Ball, exact, larger, root
 from tubecert.recheck.conditions import Setting, margin
-from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Node
-from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.cover import Outcome, stated
+from tubecert.recheck.document import Enclosure, Node, enclosure
 from tubecert.recheck.examination import Claim
-from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import all_of, at_least, at_most, margin_at_least, no_radius
-from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares
-from tubecert.recheck.metric import stated
+from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares, read_shortfalls
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +49,7 @@ class Alone(Kind[AloneSection, NoGains]):
             distance=enclosure(own["distance"]),
             uncertainty_limit=own.known("uncertainty_limit", Node.number),
             ultimate_radius=own.known("ultimate_radius", Node.number),
-            shortfalls=printed.read_shortfalls(own["shortfalls"]),
+            shortfalls=read_shortfalls(own["shortfalls"]),
         )
         if found.verdict == "certified" and found.margin is None:
             raise node.refused("is certified without a margin")

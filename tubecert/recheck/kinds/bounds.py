@@ -7,9 +7,8 @@ from fractions import Fraction
 
 from tubecert.recheck.balls import Ball, exact, root
 from tubecert.recheck.conditions import DistanceProof, Gains, Setting, distance_bound
-from tubecert.recheck.cover import Outcome
-from tubecert.recheck.enclosures import Enclosure
-from tubecert.recheck.metric import CONFIRMED, stated
+from tubecert.recheck.cover import CONFIRMED, Outcome, stated
+from tubecert.recheck.document import Enclosure
 
 
 def all_of(outcomes: Iterable[Outcome]) -> Outcome:

@@ -18,11 +18,9 @@ from tubecert.recheck.conditions import (
     margin,
     own_distance_proof,
 )
-from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Node
-from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.cover import Outcome, stated
+from tubecert.recheck.document import Enclosure, Node, enclosure
 from tubecert.recheck.examination import Claim
-from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import (
     all_of,
     margin_at_least,
@@ -32,9 +30,18 @@ from tubecert.recheck.kinds.bounds import (
     ultimate,
     words,
 )
-from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
-from tubecert.recheck.kinds.printed import GAINS, read_gains
-from tubecert.recheck.metric import stated
+from tubecert.recheck.kinds.kind import (
+    GAINS,
+    VERDICTS,
+    Asked,
+    Ground,
+    Kind,
+    Section,
+    Shares,
+    Statements,
+    read_gains,
+    read_shortfalls,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +162,7 @@ def _section(node: Node) -> DistanceSection:
         least_adaptation=own.known("least_adaptation", _pair),
         asked=own.known("asked", _pair),
         ultimate_radius=own.known("ultimate_radius", Node.number),
-        shortfalls=printed.read_shortfalls(own["shortfalls"]),
+        shortfalls=read_shortfalls(own["shortfalls"]),
     )
     if not found.pairs and found.verdict == "certified":
         raise node.refused("has no pair of gains")

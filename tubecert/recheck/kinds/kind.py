@@ -9,10 +9,9 @@ from fractions import Fraction
 from typing import ClassVar, Generic, TypeVar
 
 from tubecert.recheck.balls import Ball
-from tubecert.recheck.conditions import Setting
+from tubecert.recheck.conditions import Gains, Setting
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Node
-from tubecert.recheck.enclosures import Enclosure
+from tubecert.recheck.document import Enclosure, Members, Node, enclosure
 from tubecert.recheck.examination import SHARP, Claim
 
 VERDICTS = ("certified", "refuted", "undecided")
@@ -126,3 +125,22 @@ class Kind(ABC, Generic[S, R]):
         """What is added to u*, where the recipe is a proof; None if the theorem does not say."""
         del section, recipe, ground
         return None
+
+
+GAINS = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
+
+
+def read_gains(own: Members) -> Gains:
+    """The four gains of A and B."""
+    return Gains(
+        bandwidth=own["bandwidth"].decimal(),
+        adaptation_rate=own["adaptation_rate"].decimal(),
+        predictor_gain=own["predictor_gain"].decimal(),
+        projection_radius=own["projection_radius"].decimal(),
+    )
+
+
+def read_shortfalls(node: Node) -> tuple[Shortfall, ...]:
+    """What is missing."""
+    parts = (item.closed("condition", "margin") for item in node.entries())
+    return tuple(Shortfall(own["condition"].text(), enclosure(own["margin"])) for own in parts)

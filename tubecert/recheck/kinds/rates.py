@@ -8,11 +8,9 @@ from fractions import Fraction
 from typing import ClassVar
 
 from tubecert.recheck.conditions import Gains, Setting, derived, margins_26, own_distance_proof
-from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Node
-from tubecert.recheck.enclosures import Enclosure, enclosure
+from tubecert.recheck.cover import Outcome, stated
+from tubecert.recheck.document import Enclosure, Node, enclosure
 from tubecert.recheck.examination import Claim
-from tubecert.recheck.kinds import printed
 from tubecert.recheck.kinds.bounds import (
     all_of,
     at_most,
@@ -23,9 +21,18 @@ from tubecert.recheck.kinds.bounds import (
     ultimate,
     words,
 )
-from tubecert.recheck.kinds.kind import VERDICTS, Asked, Ground, Kind, Section, Shares, Statements
-from tubecert.recheck.kinds.printed import GAINS, read_gains
-from tubecert.recheck.metric import stated
+from tubecert.recheck.kinds.kind import (
+    GAINS,
+    VERDICTS,
+    Asked,
+    Ground,
+    Kind,
+    Section,
+    Shares,
+    Statements,
+    read_gains,
+    read_shortfalls,
+)
 
 CONDITIONS = ("26a", "26b", "26c")
 DERIVED = (
@@ -138,7 +145,7 @@ def _section(node: Node) -> RateSection:
         pair=RatePair(read_gains(own), _margins(own["margins"])) if all(present) else None,
         ultimate_radius=own.known("ultimate_radius", Node.number),
         least_adaptation=own.known("least_adaptation", _pair),
-        shortfalls=printed.read_shortfalls(own["shortfalls"]),
+        shortfalls=read_shortfalls(own["shortfalls"]),
     )
 
 

@@ -13,21 +13,20 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.clearances import along, contains, somewhere
-from tubecert.recheck.cover import Outcome
+from tubecert.recheck.cover import CONFIRMED, Outcome, stated, together
 from tubecert.recheck.cover import Range as Ends
 from tubecert.recheck.curve import Segment
 from tubecert.recheck.examination import Claim
-from tubecert.recheck.metric import CONFIRMED, smooth, stated, together
+from tubecert.recheck.metric import smooth
 from tubecert.recheck.obstacles import Obstacle, Point
-from tubecert.recheck.planned import serves
-from tubecert.recheck.reading import TIME
+from tubecert.recheck.plans import serves
 from tubecert.recheck.sampled_loop.loop import Loop, column, joined, sizes
 from tubecert.recheck.sampled_loop.record import Certificate, Proven, single
 from tubecert.recheck.sampled_loop.remainders import PLAN, Remainders, Size, Slow
 from tubecert.recheck.sampled_loop.theorem import Inequalities, Phase, phases_of
 from tubecert.recheck.sampled_loop.windows import Course, course_of
 from tubecert.recheck.specification import SampledSpecification
-from tubecert.recheck.specified.numbers import Range
+from tubecert.recheck.specified.numbers import TIME, Range
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 from tubecert.recheck.times import time_range
 

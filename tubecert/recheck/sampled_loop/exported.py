@@ -24,9 +24,8 @@ from typing import Final
 from flint import arb, ctx
 
 from tubecert.recheck.balls import Ball, exact, floor, power
-from tubecert.recheck.cover import Outcome
+from tubecert.recheck.cover import Outcome, stated
 from tubecert.recheck.document import Node
-from tubecert.recheck.metric import stated
 from tubecert.recheck.program import Program
 from tubecert.recheck.sampled_loop.record import Certificate, Proven, read_certificate, single
 from tubecert.recheck.sampled_loop.windows import Course, course_of

@@ -15,9 +15,9 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, between, exact, length
 from tubecert.recheck.program import Program
-from tubecert.recheck.reading import TIME
 from tubecert.recheck.sampled_loop.loop import column, joined, parted, picked, sizes
 from tubecert.recheck.sampled_loop.windows import Course, Window, driven, tops
+from tubecert.recheck.specified.numbers import TIME
 from tubecert.recheck.terms import NOUGHT, Term, names, slopes
 from tubecert.recheck.times import common_period
 

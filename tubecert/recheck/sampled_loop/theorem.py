@@ -20,9 +20,7 @@ from itertools import accumulate, chain, pairwise, product
 from flint import arb, arb_mat, ctx
 
 from tubecert.recheck.balls import Ball, between, exact
-from tubecert.recheck.clock import time_is_up, told
-from tubecert.recheck.cover import Outcome
-from tubecert.recheck.metric import CONFIRMED
+from tubecert.recheck.cover import CONFIRMED, Outcome, time_is_up, told
 from tubecert.recheck.sampled_loop.loop import Loop, around_zero, joined, parted, picked, sizes, stacked
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.remainders import Size, Slow

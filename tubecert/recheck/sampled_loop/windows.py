@@ -23,8 +23,8 @@ from tubecert.recheck.curve import CLOCK, Curve, Knots
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.plans import Plan
 from tubecert.recheck.program import Program
-from tubecert.recheck.reading import upright
 from tubecert.recheck.specification import SampledSpecification
+from tubecert.recheck.specified.numbers import upright
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Planned, Resting, Tabled
 from tubecert.recheck.system import curve_of, knots_of
 from tubecert.recheck.terms import Matrix, Term, names, plus, replaced, slopes, times, variable

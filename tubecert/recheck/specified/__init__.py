@@ -5,12 +5,8 @@ has a default: the canonical form writes out all that a claim rests on. `recheck
 
 | module | what it reads |
 |---|---|
-| `numbers` | kinds of numbers, ranges, rows |
-| `plant` | the system on its safe set, and the uncertainty h |
-| `trajectory` | the plan |
-| `start` | x(0) |
-| `metric` | the dual metric, or what one that is to be found must be |
-| `loop` | the loop of adaptation |
-| `hardware` | the machine that runs the controller, and the disturbance beside the inputs |
-| `idle` | what no claim rests on |
+| `numbers` | kinds of numbers, ranges, rows; expressions |
+| `plant` | the system on its safe set, the uncertainty h, the dual metric, or what one that is to be found must be |
+| `trajectory` | the plan, x(0) |
+| `loop` | the loop of adaptation, the machine that runs the controller, the disturbance beside the inputs |
 """

@@ -1,4 +1,4 @@
-"""The system on its safe set, and the uncertainty h."""
+"""The system on its safe set with its outputs, the uncertainty h, and the metric."""
 
 from __future__ import annotations
 
@@ -9,10 +9,43 @@ from fractions import Fraction
 from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import Owed, is_name
 from tubecert.recheck.lookup import Table
-from tubecert.recheck.reading import TIME, Column, Reader
-from tubecert.recheck.specified.numbers import Numbers, Range, ends, not_negative
-from tubecert.recheck.specified.outputs import read_outputs, unit_rows
-from tubecert.recheck.terms import Matrix, Term, names, number, replaced
+from tubecert.recheck.specified.numbers import (
+    TIME,
+    Column,
+    Numbers,
+    Range,
+    Reader,
+    ends,
+    not_negative,
+    positive,
+)
+from tubecert.recheck.terms import Matrix, Term, names, number, number_of, replaced, slopes
+
+
+def read_outputs(node: Node, states: Sequence[str]) -> dict[str, Numbers]:
+    """Every output, by name; one that is not linear and homogeneous is refused."""
+    found = {}
+    for name, value in node.items():
+        reader = Reader.of(states)
+        term = reader.term(value)
+        row = [slopes([term], state)[0] for state in states]
+        bent = any(e.op != "const" for e in row) or bool(reader.duties)
+        if bent or not _is(replaced([term], dict.fromkeys(states, number(0)))[0], 0):
+            raise value.refused("is not a sum of states times rational numbers")
+        found[name] = tuple(map(number_of, row))
+        if not any(found[name]):
+            raise value.refused("is nothing")
+    return found
+
+
+def unit_rows(states: Sequence[str]) -> dict[str, Numbers]:
+    """The states as outputs."""
+    return {name: tuple(Fraction(name == other) for other in states) for name in states}
+
+
+def _is(term: Term, value: int) -> bool:
+    return term.op == "const" and number_of(term) == value
+
 
 _MOST_STATES = 32
 _MOST_POINTS = 500  # of a table
@@ -170,3 +203,57 @@ def read_uncertainty(node: Node, plant: Plant, *, sudden: bool = False) -> Uncer
     if h is None and not declared.keys() >= ({"h"} if sudden else {"h", "h_x", "h_t"}):
         raise node.refused("must give h, or bounds for h, h_x and h_t")
     return Uncertainty(h, declared, tuple(reader.duties))
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A dual metric at a rate, and bounds of M that are declared for the safe set."""
+
+    dual: Matrix
+    texts: tuple[tuple[str, ...], ...]
+    rate: Fraction
+    lower: Fraction | None
+    upper: Fraction | None
+    duties: tuple[Owed, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A metric that is still to be found: at this rate, if one is given."""
+
+    rate: Fraction | None
+    condition_number: Fraction | None
+
+
+def read_metric(node: Node, plant: Plant) -> Metric | Wanted:
+    """`metric`."""
+    if "synthesise" in node.mapping():
+        return read_wanted(node.closed("synthesise")["synthesise"])
+    own = node.closed("dual_metric", "rate", optional=("bounds",))
+    n = len(plant.states)
+    reader = Reader.of(plant.states)
+    dual = reader.matrix(own["dual_metric"], n, n)
+    if any(dual[i][j] is not dual[j][i] for i in range(n) for j in range(i)):
+        raise own["dual_metric"].refused("is not symmetric")
+    bounds = own.get("bounds", lambda item: item.closed(optional=("lower", "upper")))
+    return Metric(
+        dual=dual,
+        texts=tuple(row.texts() for row in own["dual_metric"].entries()),
+        rate=positive(own["rate"]),
+        lower=None if bounds is None else bounds.get("lower", positive),
+        upper=None if bounds is None else bounds.get("upper", positive),
+        duties=tuple(reader.duties),
+    )
+
+
+def read_wanted(node: Node) -> Wanted:
+    """What a metric that is to be synthesised must be; how it is searched for is idle."""
+    keys = ("objective", "degree", "variables", "route", "solver")
+    own = node.closed(*keys, optional=("rate", "condition_number", "coordinates", "outputs"))
+    own.get("coordinates", Node.text)
+    own.get("outputs", Node.texts)
+    for key in ("objective", "degree", "route", "solver"):
+        own[key].text()
+    if own["variables"].value != "auto":
+        own["variables"].texts()
+    return Wanted(own.get("rate", positive), own.get("condition_number", positive))
