@@ -12,10 +12,10 @@ from shared import once
 from tubecert import pipeline
 from tubecert.certificate.result import Result
 from tubecert.simulation.adaptive.engine import integrate
-from tubecert.simulation.adaptive.problem import Batch, Disturbance, LoopProblem
+from tubecert.simulation.adaptive.loops import Batch, Disturbance, Failure, LoopProblem, Runs
 from tubecert.simulation.adaptive.reading import adopted
-from tubecert.simulation.adaptive.runs import Failure, Peak, Runs, Worst
 from tubecert.simulation.adaptive.setting import Setting, setting_of
+from tubecert.simulation.lanes import Found
 from tubecert.spec import Spec, load, load_text
 
 CONFIGS = Path(__file__).parent.parent / "configs"
@@ -60,43 +60,50 @@ def alone(problem: LoopProblem, x0: np.ndarray, disturbance: Disturbance, *, tol
     return integrate([batch], tolerance=tolerance)[0]
 
 
-def runs(t: np.ndarray, x: np.ndarray, distance: np.ndarray, m: int = 1, **changes: Any) -> Runs:
-    """Runs by hand around a plan at 0: x (N, K, n), distance (N, K); peaks follow from these."""
+def runs(
+    t: np.ndarray,
+    x: np.ndarray,
+    distance: np.ndarray,
+    m: int = 1,
+    *,
+    peaks: Any = None,
+    least: Any = 0.0,
+    greatest: Any = 0.0,
+    failures: tuple[Failure, ...] = (),
+    **changes: Any,
+) -> Runs:
+    """Runs by hand around a plan at 0: x (N, K, n), distance (N, K); other `peaks` (N,) with their times by name."""
     N, K, n = x.shape
-    deviation = np.linalg.norm(x, axis=2)
-    lanes = np.arange(N)
-
-    def peak(values: np.ndarray) -> Peak:
-        at = values.argmax(axis=1)
-        return Peak(value=values[lanes, at], time=t[at])
-
-    none = np.zeros((N, K))
-    peaks = {name: peak(none) for name in ("u", "k", "xtilde", "sigma_error", "h", "speed")}
-    worst = Worst(
-        **(peaks | {"distance": peak(distance), "deviation": peak(deviation)} | changes.pop("peaks", {}))
-    )
     zero = np.zeros((N, K, m))
+    sizes = {"distance": distance, "deviation": np.linalg.norm(x, axis=2)}
+    sizes |= dict.fromkeys(("u", "k", "xtilde", "sigma_error", "speed"), np.zeros((N, K)))
+    met = {name: (size.max(axis=1), t[size.argmax(axis=1)]) for name, size in sizes.items()}
+    met |= {name: (np.array(value), np.array(time)) for name, (value, time) in (peaks or {}).items()}
+    seen = {"x": x, "off": x, "slope": np.gradient(x, t, axis=1), "xtilde": 0 * x, "distance": distance}
+    seen |= dict.fromkeys(("u", "k", "u_a", "sigma_hat", "h"), zero)
+    stopped, ended = np.zeros(N, dtype=int), np.full(N, np.nan)
+    for item in failures:
+        stopped[item.lane], ended[item.lane] = 1, item.t
+    found = Found(
+        seen={name: np.moveaxis(part, 0, -1).copy() for name, part in seen.items()},
+        peak={name: value for name, (value, _) in met.items()},
+        peak_time={name: time for name, (_, time) in met.items()},
+        least=np.zeros((m, N)) + least,
+        greatest=np.zeros((m, N)) + greatest,
+        stopped=stopped,
+        ended=ended,
+    )
     values: dict[str, Any] = {
         "t": t,
-        "x": x,
-        "slope": np.gradient(x, t, axis=1),
         "x_plan": np.zeros((K, n)),
         "u_plan": np.zeros((K, m)),
-        "k": zero,
-        "u_a": zero,
-        "sigma_hat": zero,
-        "h": zero,
-        "xtilde": np.zeros((N, K, n)),
-        "distance": distance,
-        "worst": worst,
-        "least": np.zeros((N, m)),
-        "greatest": np.zeros((N, m)),
+        "found": found,
         "error": np.zeros(N),
         "unresolved": np.full(N, np.nan),
-        "failures": (),
-        "steps": np.ones(N),
+        "failures": failures,
+        "steps": np.ones(N, dtype=int),
     }
     return Runs(**(values | changes))
 
 
-__all__ = ["FLAT", "Failure", "Peak", "certified", "runs", "setting"]
+__all__ = ["FLAT", "Failure", "certified", "runs", "setting"]

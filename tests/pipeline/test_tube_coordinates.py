@@ -220,7 +220,7 @@ def test_the_loop_is_the_one_in_the_coordinates_of_the_tube():
     loop = loop_of(setting, "l1", Choice(source="distance"))
     S, problem = setting.S, loop.problem
     assert not np.allclose(problem.P, np.eye(4))
-    own, its = (Fast(problem.terms, problem.gains, P, 1, 1) for P in (problem.P, np.eye(4)))
+    own, its = (Fast(problem.adapts, problem.gains, P, 1, 1) for P in (problem.P, np.eye(4)))
     B = np.array([[0.0], [0.0], [0.0], [2 / 12]])
     flow, flow_z = own.flow(B, 0.01, 0), its.flow(S @ B, 0.01, 0)
     T = np.eye(flow.part.shape[0])

@@ -79,7 +79,8 @@ def circling(angle):
     x = np.stack([np.cos(t), 0 * t, np.sin(t)], axis=1)
     slope = np.stack([-np.sin(t), 0 * t, np.cos(t)], axis=1)
     x[5] = slope[5] = np.nan  # the run was stopped
-    runs = simulated.runs(t, x[None], np.zeros((1, 6)), slope=slope[None])
+    runs = simulated.runs(t, x[None], np.zeros((1, 6)))
+    runs.slope[:] = slope
     (found,) = of_run(SimpleNamespace(spec=spec), runs)
     return found
 

@@ -6,13 +6,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from simulated import FLAT, Failure, Peak, certified, runs, setting
+from simulated import FLAT, Failure, certified, runs, setting
 
 from tubecert.certificate.follows import InputBoundData
 from tubecert.certificate.result import Bound, Recipes
 from tubecert.errors import TubecertError
 from tubecert.letters import DISTANCE, RATES
-from tubecert.simulation.adaptive.judge import RunAt, check_class, compare, merged
+from tubecert.simulation.adaptive.judge import RunAt, check_class, compare
+from tubecert.simulation.adaptive.loops import joined
 from tubecert.simulation.adaptive.reading import Certified, Decay, promise
 from tubecert.simulation.adaptive.uncertainty import class_of
 from tubecert.spec import load_text
@@ -22,13 +23,15 @@ from tubecert.verdict import Verdict
 T = np.linspace(0, 4, 81)
 
 
-def quiet_runs(share=0.5, *, lanes=2, of_distance=None, sign=1):
+def quiet_runs(share=0.5, *, lanes=2, of_distance=None, sign=1, **changes):
     """Runs that use `share` of the tube for a moment; d is taken to be exactly sqrt(a) |x|, or of another share."""
     where = setting("flat")
     pulse = np.exp(-((T - 2) ** 2))
     x = np.zeros((lanes, len(T), 2))
     x[:, :, 1] = sign * where.rho * share * pulse
-    return runs(T, x, np.broadcast_to(where.reach * (of_distance or share) * pulse, (lanes, len(T))).copy())
+    return runs(
+        T, x, np.broadcast_to(where.reach * (of_distance or share) * pulse, (lanes, len(T))), **changes
+    )
 
 
 def promised(**changes):
@@ -139,9 +142,7 @@ def test_outputs_keep_to_their_half_widths(sign, width, expected):
 def test_every_other_bound_is_checked(name):
     own = promised(decay=None)
     for by, expected in ((-1e-3, set()), (1e-3, {name})):  # the feedback of this loop is 0, and bounded by 0
-        peak = Peak(value=np.array([0.0, own.bounds[name] + by]), time=np.array([0.0, 1.5]))
-        given = quiet_runs()
-        given = replace(given, worst=replace(given.worst, **{name: peak}))
+        given = quiet_runs(peaks={name: ([0.0, own.bounds[name] + by], [0.0, 1.5])})
         found = compare(setting("flat"), given, own)
         assert broken(found) == expected
         assert all((item.run, item.t) == (1, 1.5) for item in found.violations)
@@ -151,8 +152,7 @@ def test_every_other_bound_is_checked(name):
 def test_inputs_stay_in_their_ranges(least, expected):
     stays = InputBoundData(least=-1.0, greatest=2.0, feedback=0.0, adaptation=0.0)
     own = promised(ranges={"u": stays}, decay=None)
-    found = replace(quiet_runs(lanes=1), least=np.array([[least]]), greatest=np.array([[1.0]]))
-    compared = compare(setting("flat"), found, own)
+    compared = compare(setting("flat"), quiet_runs(lanes=1, least=[[least]], greatest=[[1.0]]), own)
     assert broken(compared) == expected
     assert (compared.inputs[0].least, compared.inputs[0].proven) == (least, (-1.0, 2.0))
 
@@ -178,7 +178,7 @@ def test_a_large_error_is_no_result():
 @pytest.mark.parametrize(("share", "left"), [(1.9, False), (2.1, True), (30.0, True)])
 def test_a_run_that_is_stopped_has_left_the_tube_beyond_two_radii(share, left):
     where, failures = setting("flat"), (Failure(lane=1, t=2.5, reason="the state diverges"),)
-    stopped = replace(quiet_runs(share), error=np.array([0.0, np.inf]), failures=failures)
+    stopped = quiet_runs(share, error=np.array([0.0, np.inf]), failures=failures)
     found = compare(where, stopped, promised())
     assert (1 in found.first_outside) is left
     assert found.no_result == (not left)
@@ -191,18 +191,15 @@ def test_runs_along_several_plans_are_numbered_through_and_judged_as_one():
     where, failures = setting("flat"), (Failure(lane=1, t=2.5, reason="the state diverges"),)
     own = promised(ultimate=0.25 * where.rho, decay=None)
     outside = quiet_runs(1.5)
-    outside.x[1, 0, 1] = 1.2 * where.rho  # the second is outside from the start
-    stopped = replace(quiet_runs(0.7), error=np.array([0.0, np.inf]), failures=failures)
-    parts = [compare(where, runs, own, 2 * i) for i, runs in enumerate((quiet_runs(), outside, stopped))]
-    found = merged(parts)
+    outside.off[1, 0, 1] = 1.2 * where.rho  # the second is outside from the start
+    stopped = quiet_runs(0.7, error=np.array([0.0, np.inf]), failures=failures)
+    found = compare(where, joined([quiet_runs(), outside, stopped]), own)
     assert (found.runs, found.left_the_tube, found.no_result) == (6, 2, 1)
     assert found.first_outside == (2, 3)
     assert found.first_exit == RunAt(run=3, t=0.0)
     assert [(item.run, item.t) for item in found.stopped] == [(5, 2.5)]
-    assert found.worst["deviation"] == parts[1].worst["deviation"]
-    assert found.worst["deviation"].run == 2
-    assert found.settled == parts[1].settled > parts[0].settled
-    assert merged([parts[0], replace(parts[1], settled=None)]).settled is None
+    assert found.worst["deviation"] == replace(compare(where, outside, own).worst["deviation"], run=2)
+    assert found.settled == compare(where, outside, own).settled > compare(where, quiet_runs(), own).settled
 
 
 def test_settling_is_measured():

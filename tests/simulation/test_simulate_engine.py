@@ -12,8 +12,9 @@ from systems import plain_model
 
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulation.adaptive.engine import integrate
-from tubecert.simulation.adaptive.problem import Batch, Disturbance, LoopGains, LoopProblem, nothing_beside
+from tubecert.simulation.adaptive.engine import _Lanes, integrate
+from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopGains, LoopProblem, nothing_beside
+from tubecert.simulation.lanes import follow
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import constant_plan
@@ -181,7 +182,8 @@ def scalar(f, B):
 def levels(case, x0, h, count):
     """x at the output times (K, n) for one level of steps after the other."""
     batch = Batch(problem=case, x0=x0, disturbance=Disturbance.from_expressions(h, case.model, 1))
-    return [integrate([batch], tolerance=1.0, level=j)[0].x[0] for j in range(count)]
+    lanes = _Lanes([batch], None)
+    return [follow(lanes.system(np.arange(1), j)).seen["x"][..., 0] for j in range(count)]
 
 
 ORIGIN = constant_plan([Fraction(0)], [Fraction(0)], None)
@@ -294,11 +296,11 @@ def test_lanes_do_not_know_each_other():
     assert [item.lane for item in vector.failures] == [7]
     assert vector.error[7] == np.inf
     assert np.isnan(vector.x[7, -1]).all()
-    assert vector.worst.h.value.max() <= 1.5 * (1 + 1e-12)
+    assert np.nanmax(np.abs(vector.h)) <= 1.5 * (1 + 1e-12)
     for lane in (0, 39):
         own = alone(case, starts[[lane]], d.of(np.array([lane])), tolerance=1e-5)
         assert np.allclose(own.x[0], vector.x[lane], rtol=0, atol=1e-12)  # BLAS sums in another order
-        assert own.worst.distance.value[0] == pytest.approx(vector.worst.distance.value[lane], abs=1e-12)
+        assert own.found.peak["distance"][0] == pytest.approx(vector.found.peak["distance"][lane], abs=1e-12)
 
 
 # x1' = x2 + 0.1 x1^3 escapes in finite time from far away
@@ -374,22 +376,6 @@ def test_loops_along_several_plans_are_lanes_of_one_vector():
         assert np.abs(own.x - found.x).max() <= own.error[0] + found.error[0] <= 1e-4
         assert np.array_equal(own.x_plan, found.x_plan)
         assert np.array_equal(own.u_plan, found.u_plan)
-
-
-def test_bad_arguments_are_refused():
-    gains = LoopGains(bandwidth=10.0, projection_radius=1.0)
-    for options in (
-        {"controller": "l1", "gains": gains},
-        {"controller": "reference"},
-        {"controller": "ccm", "horizon": -1.0},
-        {"controller": "mpc"},
-    ):
-        with pytest.raises(ValueError, match=r"needs|must"):
-            problem(**options)
-    with pytest.raises(ValueError, match="bandwidth"):
-        LoopGains(bandwidth=0.0, projection_radius=1.0)
-    with pytest.raises(ValueError, match="lanes"):
-        alone(problem("ccm"), START, Disturbance.from_expressions(None, TWO, 2), tolerance=1e-3)
 
 
 @pytest.mark.slow

@@ -85,7 +85,7 @@ def test_a_loop_that_is_not_covered_is_told_and_not_compared(limited):
     (drawn,) = simulate(setting, [loop], count=0, seed=0).drawn
     (use,) = drawn.comparison.inputs
     assert use.proven is None
-    assert use.greatest == drawn.runs.greatest.max() >= drawn.runs.u.max()
+    assert use.greatest == drawn.runs.found.greatest.max() >= drawn.runs.u.max()
 
 
 @pytest.mark.slow

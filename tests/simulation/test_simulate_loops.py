@@ -15,7 +15,7 @@ from systems import F_TWO, W_TWO, matrix_of, plain_model
 
 from tubecert.expression import cos, sin, symbol
 from tubecert.model import ControlAffineModel
-from tubecert.simulation.adaptive.problem import Disturbance, LoopGains, LoopProblem
+from tubecert.simulation.adaptive.loops import Disturbance, LoopGains, LoopProblem
 from tubecert.spec import Knots
 from tubecert.trajectory.pieces import piecewise_plan
 

@@ -13,7 +13,7 @@ from tubecert.expression import exp, symbol
 from tubecert.report.simulation import report, verdict_line
 from tubecert.simulation.adaptive.campaign import SPECIFIED, Campaign, Drawn, simulate
 from tubecert.simulation.adaptive.judge import compare
-from tubecert.simulation.adaptive.problem import Disturbance, LoopProblem
+from tubecert.simulation.adaptive.loops import Disturbance, LoopProblem
 from tubecert.simulation.adaptive.record import summary
 from tubecert.simulation.adaptive.setting import Choice, loop_of
 from tubecert.trajectory import constant_plan
@@ -48,7 +48,7 @@ def test_a_state_beyond_the_limit_is_not_followed():
     for found, limit in ((near, 200), (far, 20_000)):
         (failure,) = found.failures
         assert f"|x - x*| exceeds {limit}" in failure.reason
-        assert limit / 3 < found.worst.deviation.value[0] <= limit
+        assert limit / 3 < found.found.peak["deviation"][0] <= limit
         assert np.isnan(found.x[0, found.t > failure.t + 0.1]).all()
         ends.append(failure.t)
     assert ends[0] < ends[1] < 6

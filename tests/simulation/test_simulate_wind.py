@@ -14,7 +14,7 @@ from tubecert.simulation.adaptive import engine
 from tubecert.simulation.adaptive.attack import cases
 from tubecert.simulation.adaptive.campaign import simulate
 from tubecert.simulation.adaptive.judge import compare
-from tubecert.simulation.adaptive.problem import Disturbance
+from tubecert.simulation.adaptive.loops import Disturbance
 from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
 from tubecert.spec import load_text
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tubecert.simulation.adaptive.campaign import Campaign
+    from tubecert.simulation.adaptive.loops import Runs
     from tubecert.simulation.adaptive.record import Outcome, Summary
-    from tubecert.simulation.adaptive.runs import Runs
 
 
 OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news

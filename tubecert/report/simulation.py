@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from tubecert.simulation.adaptive.judge import Clearance, Comparison, InputUse, RunAt, Stopped, Violation
-    from tubecert.simulation.adaptive.record import GainsData, LoopData, MembersData, Summary
+    from tubecert.simulation.adaptive.loops import LoopGains
+    from tubecert.simulation.adaptive.record import LoopData, MembersData, Summary
 
 STYLES: Final = {
     "falsified": "bold red",
@@ -296,7 +297,7 @@ def _clearance(item: Clearance) -> str:
     return f"collides, {value} at {short(item.t)} s" if item.collides else value
 
 
-def _gains(loop: LoopData, gains: GainsData) -> Text:
+def _gains(loop: LoopData, gains: LoopGains) -> Text:
     return Text(
         f"{loop.controller}: projection radius {short(gains.projection_radius, 6)}, "
         f"predictor gain {gains.predictor_gain}"

@@ -6,8 +6,8 @@ an exact flow within the step, it adds to them (`System`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final, NamedTuple, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,21 @@ _WEIGHTS: Final = (1.0, 2.0, 2.0, 1.0)
 SHARES: Final = (0.0, 0.5, 0.5, 1.0)  # of a step, stage by stage
 
 
-class System(Protocol):
-    """What N lanes do; numbers of steps are those of the times that it was made for.
+class Steps(NamedTuple):
+    """When steps begin, (S + 1,) in s, and their lengths, the last 0; `outputs` (K,) begin at the output times."""
 
-    `stopped` (N,) is 0 for the lanes that go on; the others may have any values.
+    start: Array
+    length: Array
+    outputs: NDArray[np.int64]
+
+
+class System(Protocol):
+    """What N lanes do in some steps.
+
+    `stopped` (N,) is 0 for the lanes that go on; the others may have any values. Above 0 it is why they failed.
     """
 
+    steps: Steps
     stopped: NDArray[np.int64]
 
     def start(self) -> Array:
@@ -59,20 +68,36 @@ class Found(NamedTuple):
     ended: Array
 
 
+def combined(parts: Sequence[Found], how: Callable[..., Array]) -> Found:
+    """One for several, array by array: `how` takes those of all of them, with the lanes last."""
+    fields: list[Any] = [
+        {name: how(*(own[name] for own in each)) for name in each[0]}
+        if isinstance(each[0], dict)
+        else how(*each)
+        for each in zip(*parts, strict=True)
+    ]
+    return Found(*fields)
+
+
+def of_some(found: Found, lanes: NDArray[np.intp] | slice) -> Found:
+    """That of some lanes."""
+    return combined([found], lambda part: part[..., lanes])
+
+
 def ends(count: int, first: int, size: int) -> list[int]:
     """Where vectors of `count` runs begin and end, 0 first: one of `first` runs, then of `size` each."""
     return [0, *range(first, count, size), count]
 
 
-def follow(system: System, start: Array, length: Array, outputs: NDArray[np.int64]) -> Found:
-    """All steps from `start` on, (S + 1,) in s, the last of length 0; `outputs` (K,) begin at the output times."""
-    record, x, last = _Record(system, start, outputs), system.start(), len(start) - 1
+def follow(system: System) -> Found:
+    """All steps of a system, from its start on."""
+    record, x, length = _Record(system), system.start(), system.steps.length.tolist()
     with np.errstate(all="ignore"):
-        for step in range(len(start)):
+        for step in range(len(length)):
             slope = system.at(step, 0, x)
             record.see(step, x, slope)
-            if step < last:
-                x = _stepped(system, step, float(length[step]), x, slope)
+            if step < len(length) - 1:
+                x = _stepped(system, step, length[step], x, slope)
             if record.all_stopped(step):
                 break
         return record.closed()
@@ -90,8 +115,8 @@ def _stepped(system: System, step: int, length: float, x: Array, slope: Array) -
 class _Record:
     """What is left behind so far, and the rows of the steps since peaks were last taken."""
 
-    def __init__(self, system: System, start: Array, outputs: NDArray[np.int64]) -> None:
-        self._system, self._start, self._outputs = system, start, outputs
+    def __init__(self, system: System) -> None:
+        self._system, self._start, self._outputs = system, system.steps.start, system.steps.outputs
         self._rows, self._alive, self._first = list[dict[str, Array]](), list[NDArray[np.bool_]](), 0
         self._found: Found | None = None
         self._ended = np.zeros(0)

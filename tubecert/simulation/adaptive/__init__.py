@@ -5,8 +5,8 @@ Implements: theory 2 to 4b, the loops.
 
 | module | what it does |
 |---|---|
-| `problem`, `loops`, `runs` | what is simulated, the terms of the loops, and what comes out |
-| `engine` | steps are halved until the error estimate of every lane is small enough |
+| `loops` | what is simulated, what acts on it, and what comes out |
+| `engine` | batches of runs as lanes of one vector |
 | `continuous` | the loops as a system of lanes: feedback, and the stages around the fast part |
 | `flows` | (xtilde, sigma_hat, u_a): exact where linear, and caught at the ball of the projection |
 | `acting` | the plant's terms, the disturbance, wind and parameters of every lane |

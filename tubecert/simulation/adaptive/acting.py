@@ -14,7 +14,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import ZERO, Expression
 from tubecert.expression.matrix import Matrix
 from tubecert.model import TIME, ControlAffineModel
-from tubecert.simulation.adaptive.problem import Disturbance
+from tubecert.simulation.adaptive.loops import Disturbance
 
 _STEEP: Final = 3.0  # how much more than a sine the wave of a wind is a square
 _NOTHING: Final = 1e-300  # so small that nothing is divided by less

@@ -7,7 +7,6 @@ many there are, however they are grouped, and whoever does them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import ceil
 from typing import Final, NamedTuple
 
@@ -16,13 +15,12 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulation.adaptive.engine import integrate
-from tubecert.simulation.adaptive.problem import Batch, Disturbance, LoopProblem
-from tubecert.simulation.adaptive.runs import Runs
+from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopProblem, Runs
 from tubecert.simulation.adaptive.setting import Loop, Setting
 from tubecert.simulation.adaptive.uncertainty import Waves, acting, adversaries, random_members
 
 _POPULATION, _ELITE, _ROUNDS = 256, 12, 4
-_COARSER: Final = 4  # times: the steps of runs that are only compared
+_COARSER: Final = 3  # times: the steps of runs that are only compared
 _MOVED: Final = 0.3  # of the width of a gene, at first
 
 
@@ -84,11 +82,10 @@ def bred(setting: Setting, genes: Array) -> Cases:
 def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress | None = None) -> Cases:
     """The case with the largest distance that a short evolution of adversaries finds; deterministic for a seed.
 
-    Its runs take a quarter of the steps of those that are `known`: what they find is a proposal.
+    Its runs take a third of the steps of those that are `known`: what they find is a proposal.
     """
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
     kind, count = setting.uncertainty, ceil(np.median(known.steps) / _COARSER)
-    problem = replace(loop.problem, times=np.linspace(0.0, setting.horizon, count + 1))
     size = kind.adversary + kind.beside + (len(setting.x0) if setting.varied else 0)
     genes = rng.random((_POPULATION, size))
     kept, scores = np.zeros((0, size)), np.zeros(0)
@@ -96,8 +93,8 @@ def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress
         if report is not None:
             done, of = turn * _POPULATION, _ROUNDS * _POPULATION
             report(Step(phase=Phase.SIMULATION, name=f"{loop.controller}, adversary", done=done, of=of))
-        (runs,) = integrate([bred(setting, genes).of(problem)], tolerance=setting.tolerance, level=0)
-        found = np.nan_to_num(runs.worst.distance.value, nan=np.inf)
+        (runs,) = integrate([bred(setting, genes).of(loop.problem)], tolerance=setting.tolerance, count=count)
+        found = np.nan_to_num(runs.found.peak["distance"], nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, found])
         order = np.argsort(-values, kind="stable")[:_ELITE]
         kept, scores = pool[order], values[order]

@@ -19,10 +19,9 @@ from tubecert.executor import Executor, Serial
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulation.adaptive.attack import Cases, cases, worst
 from tubecert.simulation.adaptive.engine import integrate
-from tubecert.simulation.adaptive.judge import Comparison, check_class, compare, merged
-from tubecert.simulation.adaptive.problem import Batch, Disturbance
+from tubecert.simulation.adaptive.judge import Comparison, check_class, compare
+from tubecert.simulation.adaptive.loops import Batch, Disturbance, Runs, joined
 from tubecert.simulation.adaptive.record import FollowedData, LoopData, MembersData
-from tubecert.simulation.adaptive.runs import Runs, joined
 from tubecert.simulation.adaptive.setting import Loop, Setting
 from tubecert.simulation.adaptive.uncertainty import usual
 from tubecert.simulation.lanes import ends
@@ -30,6 +29,7 @@ from tubecert.trajectory import Plan
 
 LANES: Final = 128  # random runs of a vector: they are kept, and told of, when all of them are finished
 _FIRST: Final = 8  # of the first vector: who interrupts soon has these, and the loops that are drawn
+_KEPT: Final = ("x", "off", "distance")  # of random runs, at the output times
 PLANS: Final = 25  # random plans whose runs are one vector
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
@@ -145,13 +145,7 @@ def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numb
     drawn = [own.of(loop.problem) for loop in loops if not numbers.start]
     random = [cases(setting, seed, numbers).of(loop.problem) for loop in loops if loop.tested and numbers]
     found = integrate(drawn + random, tolerance=setting.tolerance)
-    return [*found[: len(drawn)], *map(_slim, found[len(drawn) :])]
-
-
-def _slim(runs: Runs) -> Runs:
-    """Runs without what only drawings need: many of them fit into memory."""
-    names = ("k", "u_a", "sigma_hat", "h", "xtilde")
-    return replace(runs, **{name: getattr(runs, name)[:, :0] for name in names})
+    return [*found[: len(drawn)], *(runs.with_only(_KEPT) for runs in found[len(drawn) :])]
 
 
 def _found(
@@ -203,41 +197,38 @@ def follow(
 
     Of an interruption what is finished is kept; None if nothing is.
     """
-    found, defects = list[list[Comparison]](), list[float]()
     tested = [loop for loop in loops if loop.tested]
+    found, defects = list[list[Runs]](), list[float]()
     with suppress(KeyboardInterrupt):
         while part := [*islice(plans, PLANS)]:
             if report is not None:
-                name, done = "random plans of the family", len(found) * each
+                name, done = "random plans of the family", len(defects) * each
                 report(Step(phase=Phase.SIMULATION, name=name, done=done, of=asked * each))
-            found += _along(setting, tested, [plan for plan, _ in part], seed, each, len(found) + 1)
+            found.append(_along(setting, tested, [plan for plan, _ in part], seed, each, len(defects) + 1))
             defects += [defect for _, defect in part]
     if not found:
         return None
+    every = [joined(parts) for parts in zip(*found, strict=True)]
     return MembersData(
         asked=asked,
-        plans=len(found),
+        plans=len(defects),
         runs_each=each,
         largest_defect=max(defects),
         loops=tuple(
-            FollowedData(loop=LoopData.of(loop), comparison=merged(rows))
-            for loop, *rows in zip(tested, *found, strict=True)
+            FollowedData(loop=LoopData.of(loop), comparison=compare(setting, runs, loop.promise))
+            for loop, runs in zip(tested, every, strict=True)
         ),
     )
 
 
 def _along(
     setting: Setting, loops: Sequence[Loop], plans: Sequence[Plan], seed: int, each: int, first: int
-) -> list[list[Comparison]]:
-    """Every loop along every plan, from this number on; output times are knots, where steps end anyway."""
-    knots = plans[0].knots
+) -> list[Runs]:
+    """Every loop along all plans, from this number on; output times are knots, where steps end anyway."""
+    knots, batches = plans[0].knots, list[list[Batch]]()
     times = setting.times if knots is None else np.array(knots.t, dtype=float)
-    around, batches = list[tuple[Setting, Loop, int]](), list[Batch]()
     for number, plan in enumerate(plans, first):
-        own = setting.along(plan)
-        drawn = cases(own, seed, range(number * each, (number + 1) * each))
-        around += [(own, loop, (number - 1) * each) for loop in loops]
-        batches += [drawn.of(replace(loop.along(plan).problem, times=times)) for loop in loops]
-    runs = zip(around, integrate(batches, tolerance=setting.tolerance), strict=True)
-    seen = [compare(own, found, loop.promise, start) for (own, loop, start), found in runs]
-    return [seen[place : place + len(loops)] for place in range(0, len(seen), len(loops))]
+        own = cases(setting.along(plan), seed, range(number * each, (number + 1) * each))
+        batches.append([own.of(replace(loop.along(plan).problem, times=times)) for loop in loops])
+    runs = integrate([batch for part in batches for batch in part], tolerance=setting.tolerance)
+    return [joined([run.with_only(_KEPT) for run in runs[i :: len(loops)]]) for i in range(len(loops))]

@@ -23,7 +23,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.acting import Acting
 from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, times
 from tubecert.simulation.adaptive.geodesics import FOUND, REASONS, Geodesic, Geodesics
-from tubecert.simulation.adaptive.problem import Batch, LoopGains, LoopProblem
+from tubecert.simulation.adaptive.loops import Batch, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.times import END, MIDDLE, START, Grid, Reference
 from tubecert.simulation.lanes import SHARES
 from tubecert.trajectory import Plan
@@ -50,6 +50,16 @@ class _Group(NamedTuple):
     flows: dict[float, Flow]
 
 
+def reason(stopped: int, limit: float) -> str:
+    """Why a lane was stopped."""
+    beyond = "" if np.isinf(limit) else f": |x - x*| exceeds {near(limit, 4)}"
+    own = {
+        INFEASIBLE: "no input makes the metric contract here",
+        DIVERGED: f"the state diverges from the plan{beyond}",
+    }
+    return {**REASONS, **own}[stopped]
+
+
 class Continuous:
     """The lanes of some batches on a grid: a `lanes.System`.
 
@@ -61,7 +71,8 @@ class Continuous:
         n, m = len(first.model.states), len(first.model.inputs)
         problems = [batch.problem for batch in batches]
         sizes = [len(batch.x0) for batch in batches]
-        self._grid, self._N, self._decay = grid, sum(sizes), 2 * float(first.model.rate)
+        self.steps, self._grid, self._N = grid.steps, grid, sum(sizes)
+        self._decay = 2 * float(first.model.rate)
         self._P = np.eye(n) if first.P is None else first.P
         self._x0 = np.concatenate([batch.x0 for batch in batches]).T
         self._acting = Acting([batch.acting for batch in batches], first.model, first.E, first.rest)
@@ -70,10 +81,10 @@ class Continuous:
         places = [next(i for i, plan in enumerate(plans) if plan is problem.plan) for problem in problems]
         self._plans = np.repeat(places, sizes) if len(plans) > 1 else None
         self._limit = np.repeat([problem.limit for problem in problems], sizes)
-        self._predicts = np.repeat([problem.terms.predicts for problem in problems], sizes)
+        self._predicts = np.repeat([problem.adapts for problem in problems], sizes)
         self._roots, self._groups = np.ones(self._N), list[_Group]()
         for problem, size, end in zip(problems, sizes, np.cumsum(sizes).tolist(), strict=True):
-            if problem.adaptive and problem.gains is not None:
+            if problem.filters and problem.gains is not None:
                 self._add(problem, problem.gains, slice(end - size, end))
         self.stopped = np.zeros(self._N, dtype=np.int64)
 
@@ -82,14 +93,12 @@ class Continuous:
         n, m = len(problem.model.states), len(problem.model.inputs)
         if self._groups:
             last = self._groups[-1]
-            if last.lanes.stop == lanes.start and (problem.terms, gains) == (
-                last.fast.terms,
-                last.fast.gains,
-            ):
+            same = (problem.adapts, gains) == (last.fast.adapts, last.fast.gains)
+            if same and last.lanes.stop == lanes.start:
                 self._groups[-1] = last._replace(lanes=slice(last.lanes.start, lanes.stop))
                 self._roots[lanes] = last.fast.root
                 return
-        fast = Fast(problem.terms, gains, self._P, m, m + n * self._blown)
+        fast = Fast(problem.adapts, gains, self._P, m, m + n * self._blown)
         self._groups.append(_Group(lanes, fast, {}))
         self._roots[lanes] = fast.root
 
@@ -101,19 +110,9 @@ class Continuous:
         self._own: list[Flow] = []
         return self._x0.copy()
 
-    def reason(self, lane: int, stopped: int) -> str:
-        """Why a lane was stopped."""
-        limit = float(self._limit[lane])
-        beyond = "" if np.isinf(limit) else f": |x - x*| exceeds {near(limit, 4)}"
-        own = {
-            INFEASIBLE: "no input makes the metric contract here",
-            DIVERGED: f"the state diverges from the plan{beyond}",
-        }
-        return {**REASONS, **own}[stopped]
-
     def at(self, step: int, stage: int, x: Array) -> Array:
         """f + B(u* + k + h) + E w (n, N); what u_a has added to x meanwhile is added here."""
-        t = float(self._grid.start[step] + SHARES[stage] * self._grid.length[step])
+        t = float(self.steps.start[step] + SHARES[stage] * self.steps.length[step])
         plan = self._plan(step, _SIDES[stage])
         if stage == 0:
             self._stages.clear()
@@ -170,8 +169,8 @@ class Continuous:
 
     def _prepare(self, step: int, x: Array) -> None:
         """The flows of a step: those of B at its middle, where x comes but for u_a."""
-        length, level = float(self._grid.length[step]), self._grid.level
-        t, B = float(self._grid.start[step]) + length / 2, self._stages[0].B
+        length, level = float(self.steps.length[step]), self._grid.level
+        t, B = float(self.steps.start[step]) + length / 2, self._stages[0].B
         if B.ndim == 3:
             B = self._acting.input(t, x + length / 2 * times(B, self._y[self._at.u_a]))
             self._own = [group.fast.flow(B[..., group.lanes], length, level) for group in self._groups]
@@ -224,7 +223,7 @@ class Continuous:
         }
 
     def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
-        """What peaks are taken of (`runs.Worst`)."""
+        """What peaks are taken of: d(x*, x), |S (x - x*)|, |u|, |k|, |S xtilde|, |sigma_hat - h|, |S x'|."""
         length, error = self._length, rows["sigma_hat"] - rows["h"]
         return {
             "distance": rows["distance"],
@@ -233,7 +232,6 @@ class Continuous:
             "k": _norm(rows["k"]),
             "xtilde": length(rows["xtilde"]),
             "sigma_error": np.where(self._predicts, _norm(error), 0.0),
-            "h": _norm(rows["h"]),
             "speed": length(rows["slope"]),
         }
 

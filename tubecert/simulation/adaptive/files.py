@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.campaign import Campaign
+from tubecert.simulation.adaptive.loops import Runs
 from tubecert.simulation.adaptive.record import summary
-from tubecert.simulation.adaptive.runs import Runs, Worst
 from tubecert.simulation.folder import npz, written_to
 
 
@@ -41,8 +40,7 @@ def _arrays(campaign: Campaign) -> Iterator[tuple[str, Array]]:
         prefix, runs = f"{attack.loop.controller}_sample", attack.runs
         yield from ((f"{prefix}_{name}", getattr(runs, name)) for name in ("t", "distance", "x", "error"))
         yield f"{prefix}_start", runs.x[:, 0]
-        for peak in fields(Worst):
-            yield f"{prefix}_largest_{peak.name}", getattr(runs.worst, peak.name).value
+        yield from ((f"{prefix}_largest_{name}", peak) for name, peak in runs.found.peak.items())
 
 
 def _named(prefix: str, runs: Runs) -> Iterator[tuple[str, Array]]:

@@ -7,7 +7,7 @@ A comparison is a record of the summary as it is: runs are told by their numbers
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -21,8 +21,8 @@ from tubecert.errors import TubecertError
 from tubecert.expression import Expression, derivatives
 from tubecert.findings import Finding
 from tubecert.model import TIME
+from tubecert.simulation.adaptive.loops import Runs
 from tubecert.simulation.adaptive.reading import Promise
-from tubecert.simulation.adaptive.runs import Runs
 from tubecert.simulation.adaptive.setting import Setting
 from tubecert.simulation.obstacles import in_plane, signed_distance
 from tubecert.spec import Spec
@@ -155,55 +155,23 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None, first: int = 
     )
 
 
-def merged(parts: Sequence[Comparison]) -> Comparison:
-    """One comparison of runs along several plans, which are numbered through."""
-    settled = [part.settled for part in parts]
-    exits = [part.first_exit for part in parts if part.first_exit is not None]
-    used = [part for part in parts if part.worst]
-    inputs: dict[str, InputUse] = {}
-    for own in (own for part in parts for own in part.inputs):
-        inputs[own.input] = own.joined(inputs.get(own.input, own))
-    return Comparison(
-        runs=sum(part.runs for part in parts),
-        left_the_tube=sum(part.left_the_tube for part in parts),
-        first_outside=tuple(run for part in parts for run in part.first_outside)[:_LISTED],
-        first_exit=min(exits, key=lambda exit: math.inf if exit.t is None else exit.t, default=None),
-        no_result=sum(part.no_result for part in parts),
-        unresolved=tuple(item for part in parts for item in part.unresolved)[:_LISTED],
-        stopped=tuple(item for part in parts for item in part.stopped)[:_LISTED],
-        worst={
-            name: max((part.worst[name] for part in used), key=lambda use: use.value)
-            for name in _SHOWN
-            if used
-        },
-        violations=tuple(item for part in parts for item in part.violations),
-        settled=None if None in settled else max(t for t in settled if t is not None),
-        final_deviation=max(
-            (p.final_deviation for p in parts if p.final_deviation is not None), default=None
-        ),
-        error_estimate=max(part.error_estimate for part in parts),
-        inputs=tuple(inputs.values()),
-    )
-
-
 def _judged(setting: Setting, runs: Runs, first: int) -> _Judged:
     """A run that was stopped has left the tube if it was far outside: its error estimate is void, its exit is not."""
     usable = runs.error <= _USABLE * setting.rho
     room = _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
-    peaks = runs.worst
-    left = usable & (peaks.deviation.value > setting.rho * (1 + room))
-    left |= usable & (peaks.distance.value > setting.reach * (1 + room))
-    for item in runs.failures:
-        left[item.lane] |= peaks.deviation.value[item.lane] > 2 * setting.rho
-    deviation = np.linalg.norm((runs.x - runs.x_plan) @ setting.S.T, axis=2)
+    peak = runs.found.peak
+    left = usable & (peak["deviation"] > setting.rho * (1 + room))
+    left |= usable & (peak["distance"] > setting.reach * (1 + room))
+    left |= (runs.found.stopped != 0) & (peak["deviation"] > 2 * setting.rho)
+    deviation = np.linalg.norm(runs.off @ setting.S.T, axis=2)
     return _Judged(setting, runs, usable, left, room, deviation, first)
 
 
 def _use(own: _Judged, name: str, bound: float | None) -> Use:
-    peak = getattr(own.runs.worst, name)
-    lane = int(np.argmax(np.where(own.usable, peak.value, -np.inf)))
-    value, share = float(peak.value[lane]), None if not bound else float(peak.value[lane]) / bound
-    return Use(value=value, bound=bound, share=share, run=own.first + lane, t=float(peak.time[lane]))
+    peak, found = own.runs.found.peak[name], own.runs.found
+    lane = int(np.argmax(np.where(own.usable, peak, -np.inf)))
+    value, t = float(peak[lane]), float(found.peak_time[name][lane])
+    return Use(value=value, bound=bound, share=value / bound if bound else None, run=own.first + lane, t=t)
 
 
 def _first_exit(own: _Judged) -> RunAt | None:
@@ -212,7 +180,8 @@ def _first_exit(own: _Judged) -> RunAt | None:
     if not len(lanes):
         return None
     beyond = (own.deviation > own.setting.rho) | (own.runs.distance > own.setting.reach)
-    at = np.where(beyond.any(axis=1), own.runs.t[np.argmax(beyond, axis=1)], own.runs.worst.deviation.time)
+    peaks = own.runs.found.peak_time["deviation"]
+    at = np.where(beyond.any(axis=1), own.runs.t[np.argmax(beyond, axis=1)], peaks)
     lane = int(lanes[np.argmin(at[lanes])])
     return RunAt(run=own.first + lane, t=float(at[lane]))
 
@@ -233,40 +202,34 @@ def _inputs(own: _Judged, promise: Promise | None) -> Iterator[InputUse]:
         column, stays = spec.inputs.index(name), ranges.get(name)
         yield InputUse(
             input=name,
-            least=float(own.runs.least[own.usable, column].min()),
-            greatest=float(own.runs.greatest[own.usable, column].max()),
+            least=float(own.runs.found.least[column, own.usable].min()),
+            greatest=float(own.runs.found.greatest[column, own.usable].max()),
             proven=(stays.least, stays.greatest) if stays else None,
         )
 
 
 def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
     """Every bound that is broken, by the run that breaks it most."""
-    runs, spec = own.runs, own.setting.spec
+    runs, found, spec = own.runs, own.runs.found, own.setting.spec
     never = np.full(runs.lanes, np.nan)  # when an input was at its end is not known
     for name, bound in promise.bounds.items():
-        peak = getattr(runs.worst, name)
-        yield from _broken(own, "tube" if name == "distance" else name, peak.value, bound, bound, peak.time)
+        words, when = "tube" if name == "distance" else name, found.peak_time[name]
+        yield from _broken(own, words, found.peak[name], bound, bound, when)
     rows = [*np.eye(len(spec.states)), *(np.array([*map(float, output.row)]) for output in spec.outputs)]
     for name, row in zip((*spec.states, *(output.name for output in spec.outputs)), rows, strict=True):
-        width, away = promise.half_widths[name], np.abs((runs.x - runs.x_plan) @ row)
+        width, away = promise.half_widths[name], np.abs(runs.off @ row)
         yield from _over_time(own, f"half-width of {name}", away, np.full(len(runs.t), width), width)
     for name, stays in promise.ranges.items():
         column, size = spec.inputs.index(name), stays.greatest - stays.least
-        ends = (("", runs.greatest, stays.greatest), ("-", -runs.least, -stays.least))
+        ends = (("", found.greatest, stays.greatest), ("-", -found.least, -stays.least))
         for sign, values, bound in ends:
-            yield from _broken(own, f"input {sign}{name}", values[:, column], bound, size, never)
+            yield from _broken(own, f"input {sign}{name}", values[column], bound, size, never)
     if promise.decay is not None:
         yield from _over_time(own, "D(t)", runs.distance, promise.decay(runs.t), own.setting.reach)
     for item in runs.failures:
         if own.left[item.lane]:
-            peak = _finite(runs.worst.deviation.value[item.lane])
-            yield Violation(
-                bound_of="tube",
-                run=own.first + item.lane,
-                t=_finite(item.t),
-                value=peak,
-                bound=own.setting.rho,
-            )
+            value, run = _finite(found.peak["deviation"][item.lane]), own.first + item.lane
+            yield Violation(bound_of="tube", run=run, t=_finite(item.t), value=value, bound=own.setting.rho)
 
 
 def _over_time(own: _Judged, name: str, values: Array, allowed: Array, scale: float) -> Iterator[Violation]:

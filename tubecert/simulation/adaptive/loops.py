@@ -1,45 +1,239 @@
-"""The loops: which terms the right-hand sides of each have. A new loop is a new row.
+"""Closed loops, what acts on every lane of one (one lane is one run), and the runs that come out.
 
-The plant is the same for all of them, x' = f + B(u + h) with u = u* + k + u_a, (0.1) and (0.4). The others:
-
-| term | right-hand side | theory |
+| controller | the filter's u_a' | beside it |
 |---|---|---|
-| `filters` | u_a' = -omega (u_a + estimate) | (0.8) |
-| `knows` | the estimate is h itself, else sigma_hat | 3, the reference system |
-| `predicts` | xtilde' = A_m xtilde - B h + what follows | (0.6) less (0.1) |
-| `adapts` | ... + B sigma_hat, and sigma_hat' = Gamma Proj(sigma_hat, -B'xtilde) | (0.6), (0.7) |
+| `nominal`, `ccm` | none: u = u* + k, without and with what is drawn | |
+| `reference` | -omega (u_a + h), theory 3 | |
+| `l1` | -omega (u_a + sigma_hat), (0.8) | predictor (0.6), adaptation (0.7) |
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from tubecert.enclosure.interval import Array
+from tubecert.expression import Expression
+from tubecert.expression.matrix import Matrix
+from tubecert.model import ControlAffineModel
+from tubecert.simulation.lanes import Found, combined
+from tubecert.trajectory import Plan
+
 Controller = Literal["nominal", "ccm", "reference", "l1"]
-
-
-class Terms(NamedTuple):
-    """Which terms a loop has."""
-
-    filters: bool = False
-    knows: bool = False
-    predicts: bool = False
-    adapts: bool = False
+CONTROLLERS: Final[tuple[Controller, ...]] = ("nominal", "ccm", "reference", "l1")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Design:
-    """A loop: its terms, whether h acts on it, and the gains that it needs apart from those of a filter."""
+class LoopGains:
+    """The gains of a loop that filters.
 
-    terms: Terms
-    disturbed: bool = True
-    needs: tuple[str, ...] = ()
+    `bandwidth` in rad/s; `adaptation_rate` is Gamma, which "l1" has; `predictor_gain` is the g of A_m = -g I in 1/s;
+    `projection_radius` is R_H; `smooth` the layer nu of the smooth projection, None for the hard one.
+    """
+
+    bandwidth: float
+    adaptation_rate: float | None
+    projection_radius: float
+    predictor_gain: float
+    smooth: float | None = None
 
 
-DESIGNS: Final[dict[Controller, Design]] = {
-    "nominal": Design(terms=Terms(), disturbed=False),
-    "ccm": Design(terms=Terms()),
-    "reference": Design(terms=Terms(filters=True, knows=True)),
-    "l1": Design(terms=Terms(filters=True, predicts=True, adapts=True), needs=("adaptation_rate",)),
-}
-CONTROLLERS: Final[tuple[Controller, ...]] = tuple(DESIGNS)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoopProblem:
+    """One closed loop over [0, horizon] in s.
+
+    `E` (n, k) is that of the wind E w, `rest` (n, 1) what unknown parameters do that no input can. `times` (K,) are the
+    output times. `degree` is that of the geodesics' polynomials (unused if W is constant). A lane is stopped where
+    |x - x*| exceeds `limit`. `P` (n, n) is S'S of the coordinates z = S x in which the adaptation is designed, None for
+    those of x; |xtilde| and |x - x*| are lengths in z.
+    """
+
+    model: ControlAffineModel
+    plan: Plan
+    controller: Controller
+    horizon: float
+    times: Array
+    gains: LoopGains | None = None
+    degree: int = 5
+    limit: float = math.inf
+    P: Array | None = None
+    E: Matrix = ()
+    rest: Matrix = ()
+
+    @property
+    def adapts(self) -> bool:
+        """Whether h is estimated: such a loop is meant to stay in the tube."""
+        return self.controller == "l1"
+
+    @property
+    def filters(self) -> bool:
+        """Whether there is u_a."""
+        return self.controller in ("reference", "l1")
+
+
+class Beside(NamedTuple):
+    """What acts beside the waves of h: the wind w of E w, and the parameters of which ranges are known.
+
+    Every array has the lanes first. The wind is |w| <= `wind` (N,); its `aim` (N,) is 0 along `blowing` (N, k), 1
+    outward along E'M gamma_s, 2 along the inputs, E'B B'M gamma_s. It goes forwards and backwards as a square wave of
+    frequency and phase says: `gusting` (N, 2). `theta` (N, p) are the parameters.
+    """
+
+    wind: Array
+    aim: Array
+    blowing: Array
+    gusting: Array
+    theta: Array
+
+
+def nothing_beside(N: int, k: int = 0) -> Beside:
+    """No wind, for N lanes of k winds; all parameters are known."""
+    return Beside(*(np.zeros((N, *shape)) for shape in ((), (), (k,), (2,), (0,))))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Disturbance:
+    """h(t, x) of N lanes; every array has the lanes first.
+
+    h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'(x - centre) + phase_k) + push c),
+    where clip is the projection to the ball of `radius` (inf: none), and c = B'M gamma_s /
+    sqrt(|B'M gamma_s|^2 + layer^2) at x, the direction that pushes away from the plan. At fixed x the rate of a wave is
+    at most |amplitude| frequency, its slope |amplitude| |wave|.
+
+    Shapes: base (m,) expressions of t and the states, or None for 0; amplitude (N, W, m), frequency (N, W) in rad/s,
+    wave (N, W, n), phase (N, W), push (N,), radius (N,), centre (n,).
+    """
+
+    base: tuple[Expression, ...] | None
+    amplitude: Array
+    frequency: Array
+    wave: Array
+    phase: Array
+    push: Array
+    radius: Array
+    centre: Array
+    beside: Beside
+    layer: float = 1e-3
+
+    @property
+    def lanes(self) -> int:
+        """N."""
+        return len(self.push)
+
+    def of(self, lanes: NDArray[np.intp]) -> Disturbance:
+        """The disturbance of some lanes, given by their numbers."""
+        own = ("amplitude", "frequency", "wave", "phase", "push", "radius")
+        beside = Beside(*(part[lanes] for part in self.beside))
+        return replace(self, beside=beside, **{name: getattr(self, name)[lanes] for name in own})
+
+    @classmethod
+    def from_expressions(
+        cls, base: tuple[Expression, ...] | None, model: ControlAffineModel, lanes: int, k: int = 0
+    ) -> Disturbance:
+        """The same h, given by expressions of t and the states, on every lane; none of k winds."""
+        n, m = len(model.states), len(model.inputs)
+
+        def none(*shape: int) -> Array:
+            return np.zeros((lanes, *shape))
+
+        return cls(
+            base=base,
+            amplitude=none(0, m),
+            frequency=none(0),
+            wave=none(0, n),
+            phase=none(0),
+            push=none(),
+            radius=np.full(lanes, np.inf),
+            centre=np.zeros(n),
+            beside=nothing_beside(lanes, k),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Batch:
+    """N runs of a loop from x0 (N, n) under a disturbance of N lanes."""
+
+    problem: LoopProblem
+    x0: Array
+    disturbance: Disturbance
+
+    @property
+    def acting(self) -> Disturbance:
+        """What acts on the loop: nothing on one that is run without any disturbance."""
+        if self.problem.controller != "nominal":
+            return self.disturbance
+        return Disturbance.from_expressions(None, self.problem.model, len(self.x0))
+
+    def of(self, lanes: NDArray[np.intp]) -> Batch:
+        """Some of the runs, given by their numbers."""
+        return replace(self, x0=self.x0[lanes], disturbance=self.disturbance.of(lanes))
+
+
+class Failure(NamedTuple):
+    """A lane that was stopped: when, in s, and why."""
+
+    lane: int
+    t: float
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Runs:
+    """N runs at K output times.
+
+    `t` (K,), `x_plan` (K, n), `u_plan` (K, m). What was seen is an attribute, too, with the lanes first: x, x - x* =
+    `off`, x' = `slope` and `xtilde` (N, K, n), `k`, `u_a`, `sigma_hat`, `h` and u = u* + k + u_a (N, K, m), `distance`
+    (N, K), the Riemannian d(x*, x). A quantity that a loop does not have is 0. Peaks over all steps are in `found`, as
+    are the ends of inputs. After a lane was stopped its values are nan. `error`, `unresolved` and `steps` (N,):
+    `halving.Resolved`.
+    """
+
+    t: Array
+    x_plan: Array
+    u_plan: Array
+    found: Found
+    error: Array
+    unresolved: Array
+    steps: NDArray[np.int64]
+    failures: tuple[Failure, ...]
+
+    def __getattr__(self, name: str) -> Array:
+        if name == "found" or name not in self.found.seen:
+            raise AttributeError(name)
+        return np.moveaxis(self.found.seen[name], -1, 0)
+
+    @property
+    def lanes(self) -> int:
+        """N."""
+        return len(self.error)
+
+    def with_only(self, names: Sequence[str]) -> Runs:
+        """The same without what else was seen: many of them fit into memory."""
+        seen = {name: self.found.seen[name] for name in names}
+        return replace(self, found=self.found._replace(seen=seen))
+
+
+def joined(parts: Sequence[Runs]) -> Runs:
+    """Runs at the same times, one after the other; lanes are numbered through."""
+    starts = np.cumsum([0, *(part.lanes for part in parts)]).tolist()
+
+    def last(*arrays: Array) -> Array:
+        return np.concatenate(arrays, axis=-1)
+
+    return replace(
+        parts[0],
+        found=combined([part.found for part in parts], last),
+        failures=tuple(
+            item._replace(lane=start + item.lane)
+            for start, part in zip(starts, parts, strict=False)
+            for item in part.failures
+        ),
+        error=last(*(part.error for part in parts)),
+        unresolved=last(*(part.unresolved for part in parts)),
+        steps=np.concatenate([part.steps for part in parts]),
+    )

@@ -6,12 +6,12 @@ The words are chosen with care: a simulation that finds nothing has not falsifie
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, Literal
 
 from tubecert.records import INLINE, Json, to_json
 from tubecert.simulation.adaptive.judge import Clearance, Comparison, of_plan, of_run, of_tube
-from tubecert.simulation.adaptive.problem import LoopGains
+from tubecert.simulation.adaptive.loops import LoopGains
 from tubecert.simulation.adaptive.setting import Loop, Setting
 
 if TYPE_CHECKING:
@@ -22,21 +22,6 @@ Outcome = Literal["falsified", "tube left", "no result", "interrupted", "not fal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GainsData:
-    """Gains of a loop; None where it has no such gain."""
-
-    bandwidth: float
-    adaptation_rate: float | None
-    projection_radius: float
-    predictor_gain: float
-
-    @classmethod
-    def of(cls, gains: LoopGains) -> GainsData:
-        """What is told of gains."""
-        return cls(**{item.name: getattr(gains, item.name) for item in fields(cls)})
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class LoopData:
     """A loop, whether a certificate covers its gains, and whether it is meant to stay in the tube."""
 
@@ -44,7 +29,7 @@ class LoopData:
     gains_are: str
     covered: bool
     tested: bool
-    gains: GainsData | None = None
+    gains: LoopGains | None = None
 
     @classmethod
     def of(cls, loop: Loop) -> LoopData:
@@ -54,7 +39,7 @@ class LoopData:
             gains_are=loop.origin,
             covered=loop.promise is not None,
             tested=loop.tested,
-            gains=None if loop.problem.gains is None else GainsData.of(loop.problem.gains),
+            gains=loop.problem.gains,
         )
 
 
@@ -82,23 +67,12 @@ class RandomData:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WaveData:
-    """The h that the adversary found, a wave in x and t."""
-
-    amplitude: list[list[float]]
-    frequency: list[float]
-    wave: list[list[float]]
-    phase: list[float]
-    push: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class AdversaryData:
-    """The run of the adversary, its start, its h and what acted beside it."""
+    """The run of the adversary, its start, its h, a wave in x and t (`loops.Disturbance`), and what acted beside it."""
 
     comparison: Comparison = field(metadata=INLINE)
     start: list[float]
-    h: WaveData
+    h: Mapping[str, list[float]]
     beside: Mapping[str, list[float]] | None = None
 
 
@@ -240,6 +214,6 @@ def _adversary(item: Attack, setting: Setting) -> AdversaryData | None:
     return AdversaryData(
         comparison=item.worst_comparison,
         start=start[0].tolist(),
-        h=WaveData(**{name: getattr(h, name)[0].tolist() for name in names}),
+        h={name: getattr(h, name)[0].tolist() for name in names},
         beside=beside if setting.uncertainty.sources else None,
     )

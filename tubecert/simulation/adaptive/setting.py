@@ -21,8 +21,7 @@ from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.findings import Finding
 from tubecert.kinds import DISTANCE, name_of
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulation.adaptive.loops import DESIGNS, Controller
-from tubecert.simulation.adaptive.problem import LoopGains, LoopProblem
+from tubecert.simulation.adaptive.loops import Controller, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.reading import Certified, Promise, certified_plan, promise
 from tubecert.simulation.adaptive.uncertainty import Class, Sources, class_of
 from tubecert.spec import Spec
@@ -220,7 +219,7 @@ class Loop:
     @property
     def tested(self) -> bool:
         """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
-        return self.problem.terms.predicts
+        return self.problem.adapts
 
 
 def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
@@ -230,25 +229,24 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
         message = "parameters known by ranges stand in B, and the loops are stated for a known B"
         help = "give each of them one value: --set system.parameters.NAME=VALUE"
         raise TubecertError([Finding(code="TC705", message=message, location=where, help=help)])
-    terms, kind, own = DESIGNS[controller].terms, name_of(choice.source), setting.certified
-    gains, covered = _gains(setting, controller, choice) if terms.filters else (None, False)
+    kind, own = name_of(choice.source), setting.certified
     problem = LoopProblem(
         model=setting.model,
         plan=setting.plan,
         controller=controller,
         horizon=setting.horizon,
         times=setting.times,
-        gains=gains,
         limit=_LIMIT * setting.greatest_radius,
         degree=_EVEN_DEGREE if _even(own) else _DEGREE,
         P=own.S.T @ own.S,
         E=setting.E,
         rest=setting.rest,
     )
+    gains, covered = _gains(setting, problem, choice) if problem.filters else (None, False)
     return Loop(
-        problem=problem,
+        problem=replace(problem, gains=gains),
         origin="no adaptation" if gains is None else f"certified by {kind}" if covered else CHOSEN,
-        promise=promise(own, kind) if covered and terms.predicts else None,
+        promise=promise(own, kind) if covered and problem.adapts else None,
     )
 
 
@@ -257,16 +255,16 @@ def _even(own: Certified) -> bool:
     return own.upper is not None and own.upper <= _EVEN * (own.reach / own.rho) ** 2
 
 
-def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[LoopGains, bool]:
+def _gains(setting: Setting, problem: LoopProblem, choice: Choice) -> tuple[LoopGains, bool]:
     """The gains of a loop that filters, and whether they are those that a certificate proves."""
-    adapts, kind = DESIGNS[controller].terms.adapts, name_of(choice.source)
+    adapts, kind = problem.adapts, name_of(choice.source)
     proven, smooth = setting.certified.proven(kind), setting.spec.adaptation.smooth
     bandwidth = choice.bandwidth or (None if proven is None else proven.bandwidth)
     rate = choice.adaptation_rate or (None if proven is None else proven.adaptation_rate)
     if bandwidth is None or (adapts and rate is None):
         lacks = ("--bandwidth", bandwidth is None), ("--adaptation-rate", adapts and rate is None)
         options = " and ".join(option for option, missing in lacks if missing)
-        message = f"{kind} certifies no gains for the controller {controller}"
+        message = f"{kind} certifies no gains for the controller {problem.controller}"
         help = f"choose {options} (then nothing is covered by the certificate), or another --gains"
         raise TubecertError([Finding(code="TC705", message=message, help=help)])
     # R_H where no certificate gives one: Dh, with what the smooth layer needs

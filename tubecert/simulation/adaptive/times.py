@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.model import TIME
-from tubecert.simulation.adaptive.problem import LoopProblem
+from tubecert.simulation.adaptive.loops import LoopProblem
+from tubecert.simulation.lanes import Steps
 from tubecert.spec import Knots
 from tubecert.trajectory import Plan
 
@@ -29,17 +30,14 @@ class Reference(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Steps of a level: `start` and `length` (S + 1,) in s, the last of length 0.
+    """Steps of a level.
 
-    `outputs` (K,) are the numbers of the steps that start at the output times. `plan`: x* (S + 1, 3, n, L), f(x*) +
-    B(x*)u* (S + 1, 3, n, L) and u* (S + 1, 3, m, L) of L plans at start, middle and end of every step; where u* jumps,
-    the side that belongs to the step.
+    `plan`: x* (S + 1, 3, n, L), f(x*) + B(x*)u* (S + 1, 3, n, L) and u* (S + 1, 3, m, L) of L plans at start, middle
+    and end of every step; where u* jumps, the side that belongs to the step.
     """
 
     level: int
-    start: Array
-    length: Array
-    outputs: NDArray[np.int64]
+    steps: Steps
     plan: Reference
 
 
@@ -75,21 +73,36 @@ def nearest(t: Array, wanted: Array) -> Array:
     return np.asarray(right - (wanted - t[right - 1] < t[right] - wanted))
 
 
-def steps(problem: LoopProblem, level: int, plans: Sequence[Plan] = ()) -> Grid:
-    """The steps of a level, each level with twice as many as the one before; of the problem's plan, or of several."""
-    plans = plans or (problem.plan,)
+def steps(problem: LoopProblem, level: int, plans: Sequence[Plan]) -> Grid:
+    """The steps of a level, each level with twice as many as the one before, along some plans."""
     t = corners(problem, plans)
-    spans = np.diff(t)
-    counts = np.maximum(1, np.ceil(spans / problem.horizon * _FEWEST_STEPS)).astype(np.int64) * 2**level
+    counts = np.maximum(1, np.ceil(np.diff(t) / problem.horizon * _FEWEST_STEPS)).astype(np.int64) * 2**level
+    outputs = np.concatenate([[0], np.cumsum(counts)])[nearest(t, problem.times)]
+    return _grid(problem, plans, t, counts, outputs, level)
+
+
+def uniform(problem: LoopProblem, count: int, plans: Sequence[Plan]) -> Grid:
+    """So many equal steps, which pass over the corners of plans, and no output times but the ends."""
+    ends = np.array([0.0, problem.horizon])
+    return _grid(problem, plans, ends, np.array([count]), np.array([0, count]))
+
+
+def _grid(
+    problem: LoopProblem,
+    plans: Sequence[Plan],
+    t: Array,
+    counts: NDArray[np.int64],
+    outputs: NDArray[np.int64],
+    level: int = 0,
+) -> Grid:
+    """So many steps (C - 1,) between times (C,)."""
     first = np.concatenate([[0], np.cumsum(counts)])
-    length = np.repeat(spans / counts, counts)
+    length = np.repeat(np.diff(t) / counts, counts)
     start = np.repeat(t[:-1], counts) + (np.arange(first[-1]) - np.repeat(first[:-1], counts)) * length
     courses = [_course(problem, plan, start, length) for plan in plans]
     return Grid(
         level=level,
-        start=np.append(start, problem.horizon),
-        length=np.append(length, 0.0),
-        outputs=first[nearest(t, problem.times)],
+        steps=Steps(np.append(start, problem.horizon), np.append(length, 0.0), outputs),
         plan=Reference(*(np.stack(part, axis=-1) for part in zip(*courses, strict=True))),
     )
 

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulation.adaptive.problem import Beside, Disturbance, nothing_beside
+from tubecert.simulation.adaptive.loops import Beside, Disturbance, nothing_beside
 from tubecert.simulation.adaptive.reading import Certified
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
