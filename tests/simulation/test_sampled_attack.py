@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from tubecert.simulation.sampled import campaign
 from tubecert.simulation.sampled.attack import Attack, worst_of
 from tubecert.simulation.sampled.campaign import simulate
 from tubecert.simulation.sampled.kernels import goals
+from tubecert.simulation.sampled.loop import linear
 
 
 def followed(aims, size, rate):
@@ -76,10 +78,10 @@ def test_a_lie_is_found_with_seed_run_and_time(how):
     found = simulate(own, "hash", runs=20, seed=4)
     assert (found.outcome, found.summary["seed"]) == ("falsified", 4)
     first = found.violations[0]
-    attack = Attack(setting=own, seed=4)
-    again = campaign.chunk(attack, attack.lanes(first.peak.run, first.peak.run + 1))
-    assert again.left[0] == first.peak.t
-    assert own.names[again.what[0]] == first.of
+    run, attack = first.peak.run, Attack(setting=own, seed=4)
+    again = campaign.vector(attack, partial(linear, own.tables), range(run, run + 1)).found
+    assert again.peak_time[first.of][0] == first.peak.t
+    assert again.peak[first.of][0] == pytest.approx(first.peak.share, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -95,9 +97,11 @@ def test_what_is_finished_stays_and_the_same_seed_says_the_same(monkeypatch):
     own = setting("scalar")
     whole, some = simulate(own, "h", runs=60, seed=1), simulate(own, "h", runs=60, seed=1, report=stop)
     assert (some.outcome, some.runs, told) == ("interrupted", 64, [0, 32, 64])
-    np.testing.assert_array_equal(whole.all("share")[:, :64], some.all("share"))
+    np.testing.assert_array_equal(whole.arrays["share"][:, :64], some.arrays["share"])
     assert whole.summary["states"]["x"]["random_by_stage"]
-    assert (simulate(own, "h", runs=60, seed=2).all("share")[:, 60:] != whole.all("share")[:, 60:]).any()
+    assert (
+        simulate(own, "h", runs=60, seed=2).arrays["share"][:, 60:] != whole.arrays["share"][:, 60:]
+    ).any()
 
 
 @pytest.mark.slow

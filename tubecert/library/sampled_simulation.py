@@ -83,7 +83,7 @@ class SampledSimulation:
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        shares = self.campaign.all("share").max(axis=1)
+        shares = self.campaign.arrays["share"].max(axis=1)
         own, style = self.campaign.setting, "falsified" if self.falsified else ""
         rows = [
             (name, f"largest share {short(share)}") for name, share in zip(own.names, shares, strict=True)

@@ -33,9 +33,11 @@ class Family(Protocol):
 
     def system(self, lanes: Places, level: int) -> System:
         """Some of the lanes at a level."""
+        ...
 
     def apart(self, finer: Found, coarser: Found) -> tuple[Array, Array]:
         """How far states are apart at the output times (K, N), and what else is, in shares of what may be, (N,)."""
+        ...
 
 
 class Resolved(NamedTuple):

@@ -36,6 +36,10 @@ class System(Protocol):
     steps: Steps
     stopped: NDArray[np.int64]
 
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Names of what stays behind of what is seen."""
+
     def start(self) -> Array:
         """x (n, N) at the start."""
 
@@ -55,8 +59,9 @@ class System(Protocol):
 class Found(NamedTuple):
     """What N lanes leave behind.
 
-    `seen` (K, .., N) at the output times, nan where they did not come; `peak` and `peak_time` (N,) by name; `least` and
-    `greatest` (m, N) of the inputs; why (0: it was not) and when a lane was `stopped`, `ended` (N,).
+    `seen` (K, .., N) at the output times, nan where they did not come; `peak` (-inf where there is none) and `peak_time`
+    (N,) by name; `least` and `greatest` (m, N) of the inputs; why (0: it was not) and when a lane was `stopped`,
+    `ended` (N,).
     """
 
     seen: dict[str, Array]
@@ -82,11 +87,6 @@ def combined(parts: Sequence[Found], how: Callable[..., Array]) -> Found:
 def of_some(found: Found, lanes: NDArray[np.intp] | slice) -> Found:
     """That of some lanes."""
     return combined([found], lambda part: part[..., lanes])
-
-
-def ends(count: int, first: int, size: int) -> list[int]:
-    """Where vectors of `count` runs begin and end, 0 first: one of `first` runs, then of `size` each."""
-    return [0, *range(first, count, size), count]
 
 
 def follow(system: System) -> Found:
@@ -166,8 +166,8 @@ class _Record:
     def _nothing(self, rows: Mapping[str, Array], sizes: Mapping[str, Array]) -> Found:
         K, N, inputs = len(self._outputs), len(self._system.stopped), rows["u"].shape[1:]
         return Found(
-            seen={name: np.full((K, *part.shape[1:]), np.nan) for name, part in rows.items()},
-            peak={name: np.zeros(N) for name in sizes},
+            seen={name: np.full((K, *rows[name].shape[1:]), np.nan) for name in self._system.kept},
+            peak={name: np.full(N, -np.inf) for name in sizes},
             peak_time={name: np.zeros(N) for name in sizes},
             least=np.full(inputs, np.inf),
             greatest=np.full(inputs, -np.inf),

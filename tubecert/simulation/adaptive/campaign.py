@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice, pairwise, takewhile
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -24,7 +24,7 @@ from tubecert.simulation.adaptive.loops import Batch, Disturbance, Runs, joined
 from tubecert.simulation.adaptive.record import FollowedData, LoopData, MembersData
 from tubecert.simulation.adaptive.setting import Loop, Setting
 from tubecert.simulation.adaptive.uncertainty import usual
-from tubecert.simulation.lanes import ends
+from tubecert.simulation.vectors import finished, vectors_of
 from tubecert.trajectory import Plan
 
 LANES: Final = 128  # random runs of a vector: they are kept, and told of, when all of them are finished
@@ -100,9 +100,9 @@ def simulate(
         replay = 0
     own = _specified(setting) if replay is None else cases(setting, seed, [replay])
     tested = [loop for loop in loops if loop.tested] if count else []
-    numbers = range(count if tested else 0)
-    vectors = [numbers[a:b] for a, b in pairwise(ends(len(numbers), min(_FIRST, LANES), LANES))]
-    found = _found(partial(_vector, setting, loops, own, seed), vectors, report, executor)
+    vectors = vectors_of(count if tested else 0, min(_FIRST, LANES), LANES)
+    work = partial(_vector, setting, loops, own, seed)
+    found = finished(work, vectors, executor, report, "loops and random runs")
     parts, complete = [runs[len(runs) - len(tested) :] for runs in found], len(found) == len(vectors)
     drawn = [
         Drawn(loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise))
@@ -146,30 +146,6 @@ def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numb
     random = [cases(setting, seed, numbers).of(loop.problem) for loop in loops if loop.tested and numbers]
     found = integrate(drawn + random, tolerance=setting.tolerance)
     return [*found[: len(drawn)], *(runs.with_only(_KEPT) for runs in found[len(drawn) :])]
-
-
-def _found(
-    work: partial[list[Runs]], vectors: list[range], report: Progress | None, executor: Executor
-) -> list[list[Runs]]:
-    """The runs of all vectors; of an interruption those before the first one that is missing, if there are any."""
-    found: dict[int, list[Runs]] = {}
-
-    def tell(done: int) -> None:
-        if report is not None:
-            name = "loops and random runs"
-            report(Step(phase=Phase.SIMULATION, name=name, done=done, of=sum(map(len, vectors))))
-
-    def ready(place: int, runs: list[Runs]) -> None:
-        found[place] = runs
-        tell(sum(len(vectors[each]) for each in found))
-
-    tell(0)
-    try:
-        executor.map(work, vectors, ready)
-    except KeyboardInterrupt:
-        if 0 not in found:
-            raise
-    return [found[place] for place in takewhile(found.__contains__, range(len(vectors)))]
 
 
 def _attacked(setting: Setting, attack: Attack, seed: int, report: Progress | None) -> Attack:

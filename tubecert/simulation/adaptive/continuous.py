@@ -66,6 +66,8 @@ class Continuous:
     `_y` (Y, N) is the fast part of every lane at the start of the step (`flows.blocks`).
     """
 
+    kept = ("x", "off", "slope", "u", "k", "u_a", "sigma_hat", "h", "xtilde", "distance")
+
     def __init__(self, batches: Sequence[Batch], grid: Grid, plans: Sequence[Plan]) -> None:
         first = batches[0].problem
         n, m = len(first.model.states), len(first.model.inputs)

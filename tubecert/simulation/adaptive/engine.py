@@ -85,5 +85,6 @@ class _Lanes:
         z = finer.seen["x"] - coarser.seen["x"]
         square = (z * (z if self._P is None else self._P @ z)).sum(axis=1)
         moved = np.sqrt(((finer.seen["sigma_hat"] - coarser.seen["sigma_hat"]) ** 2).sum(axis=1)).max(axis=0)
-        peaks = np.abs(finer.peak["sigma_error"] - coarser.peak["sigma_error"])
+        with np.errstate(invalid="ignore"):  # lanes that were stopped at once have no peak
+            peaks = np.abs(finer.peak["sigma_error"] - coarser.peak["sigma_error"])
         return np.sqrt(np.maximum(square, 0.0)), np.maximum(moved, peaks) / self._room[self._own]

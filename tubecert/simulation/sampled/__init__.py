@@ -9,7 +9,7 @@ what they falsify. All runs are lanes of one numpy vector. Trusted: no.
 | `kernels` | what each signal does to a state, lag by lag, in the loop without remainders |
 | `families` | what lanes follow: the plan, or random plans of a family |
 | `attack` | the lanes: adversaries, who know the kernels, and random signals |
-| `loop` | samples, delay, held inputs; integrated twice, with what is seen of every lane |
-| `campaign` | lanes by chunks, what they come to, and its summary |
+| `loop` | samples, delay, held inputs; lanes as a system, and their steps |
+| `campaign` | lanes by vectors, what they come to, and its summary |
 | `figures` | the files of a campaign |
 """

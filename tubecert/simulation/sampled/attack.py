@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,14 @@ class Lanes(NamedTuple):
     draws: Draws
     parameters: Array
     off: Array
+
+    def of(self, lanes: NDArray[np.intp]) -> Lanes:
+        """Some of them, by their places."""
+        parts: list[Any] = [
+            Draws(*(draws[..., lanes] for draws in part)) if isinstance(part, Draws) else part[..., lanes]
+            for part in self
+        ]
+        return Lanes(*parts)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,4 +1,4 @@
-"""A campaign: adversaries, then random runs, by chunks; what is finished stays when the user interrupts.
+"""A campaign: adversaries, then random runs, as vectors; what is finished stays when the user interrupts.
 
 Trusted: no; it can falsify a certificate, and never supports one.
 """
@@ -6,30 +6,46 @@ Trusted: no; it can falsify a certificate, and never supports one.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
-from itertools import pairwise
-from math import ceil
+from functools import cached_property, partial
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.progress import Phase, Progress, Step
-from tubecert.simulation.lanes import ends
-from tubecert.simulation.sampled.attack import Attack, Flags, Lanes
-from tubecert.simulation.sampled.families import course_of, courses
-from tubecert.simulation.sampled.loop import SINGLE, Controllers, Seen, linear, run
+from tubecert.executor import Serial
+from tubecert.progress import Progress
+from tubecert.simulation.halving import resolved
+from tubecert.simulation.lanes import Found, combined
+from tubecert.simulation.sampled.attack import Attack, Flags
+from tubecert.simulation.sampled.loop import DIVERGED, Controllers, Vector, gap, linear
 from tubecert.simulation.sampled.setting import Setting
+from tubecert.simulation.vectors import finished, vectors_of
 from tubecert.verdict import Verdict
 
 FORMAT: Final = "tubecert-sampled-simulation/1"
-_FIRST: Final = 64  # of the first chunk: who interrupts soon has these
-LANES: Final = 1024  # of a chunk: the more, the cheaper is each
-_PLANS: Final = 256  # of a chunk whose lanes have plans of their own, which are kept
+_FIRST: Final = 64  # of the first vector: who interrupts soon has these
+LANES: Final = 1024  # of a vector: the more, the cheaper is each
+_PLANS: Final = 256  # of a vector whose lanes have plans of their own, which are kept
+_TOLERANCE: Final = 1e-3  # of a half-width, asked of the integration
 _RESOLVED: Final = 0.01  # of a half-width, that a run may be wrong by
-_PACE: Final = 0.15  # |A| times the length of a step of RK4
-_FINER: Final = 3  # times that steps are made shorter, four times each, where they were too long
+_ROUNDING: Final = 1e-9  # of a bound: that of floats
+_SINGLE: Final = 2.0**-22  # of an input: how far that of a plan in single precision is off
+_APART: Final = 16  # numbers of runs that are drawn
+_DRAWN: Final = 512  # of the first
 _LISTED: Final = 20  # of the violations
+
+
+class Seen(NamedTuple):
+    """What is left of a vector of lanes: peaks, `error` (N,), `path` (K, n, D) of some, the `plan` (K, n) of the first.
+
+    `profile` (2, n + m, K): `loop.Sampled`.
+    """
+
+    found: Found
+    error: Array
+    profile: Array
+    path: Array
+    plan: Array
 
 
 def simulate(
@@ -42,31 +58,21 @@ def simulate(
     report: Progress | None = None,
 ) -> Campaign:
     """All adversaries and `runs` random runs, or what an interruption leaves; `controllers`: else tables in floats."""
-    attack, found = Attack(setting=setting, seed=seed), list[Seen]()
+    attack = Attack(setting=setting, seed=seed)
     asked, size = len(attack.aims) + runs, LANES if setting.spec.trajectory.bundle is None else _PLANS
-    try:
-        for first, last in pairwise(ends(asked, min(_FIRST, size), size)):
-            if report is not None:
-                report(Step(phase=Phase.SIMULATION, done=first, of=asked))
-            found.append(chunk(attack, attack.lanes(first, last), controllers))
-    except KeyboardInterrupt:
-        if not found:
-            raise
+    vectors, made = vectors_of(asked, min(_FIRST, size), size), controllers or partial(linear, setting.tables)
+    found = finished(partial(vector, attack, made), vectors, Serial(), report)
     code: Literal["c", "floats"] = "c" if controllers else "floats"
     return Campaign(attack=attack, certificate=certificate, asked=asked, controller=code, found=tuple(found))
 
 
-def chunk(attack: Attack, lanes: Lanes, controllers: Controllers | None = None) -> Seen:
-    """What is seen of some lanes, in steps that are short enough if any are."""
-    setting, bundle = attack.setting, attack.setting.spec.trajectory.bundle
-    course = course_of(setting) if bundle is None else courses(setting, bundle, lanes.draws.plan)
-    made = controllers or partial(linear, setting.tables)
-    size = float(abs(setting.loop.A).sum(axis=1).max() * setting.lengths.max())
-    for finer in range(_FINER):
-        seen = run(attack, lanes, course, made, max(1, ceil(size / _PACE)) * 4**finer)
-        if (seen.slack <= _RESOLVED).all() or np.isfinite(seen.left).any():
-            break
-    return seen
+def vector(attack: Attack, made: Controllers, numbers: range) -> Seen:
+    """What is seen of some lanes."""
+    own = Vector(attack, attack.lanes(numbers.start, numbers.stop), made)
+    best = resolved(own, _TOLERANCE)
+    drawn = [place for place, number in enumerate(numbers) if number % _APART == 0 and number < _DRAWN]
+    path, plan = best.found.seen["x"][..., drawn], own.course.x[:: len(attack.setting.lengths), :, 0]
+    return Seen(best.found._replace(seen={}), best.error, own.profile, path, plan)
 
 
 class Peak(NamedTuple):
@@ -80,7 +86,7 @@ class Peak(NamedTuple):
 
 
 class Violation(NamedTuple):
-    """How far a run was outside, at t for the first time: by `of`; `aimed`: what an adversary wanted, else empty."""
+    """How far a run was outside: by `of`; `aimed`: what an adversary wanted, else empty."""
 
     of: str
     aimed: str
@@ -97,7 +103,7 @@ class Went(NamedTuple):
     @property
     def beyond(self) -> bool:
         """Whether it left what is proven, but for the rounding of a plan."""
-        room = SINGLE * max(abs(self.least), abs(self.greatest))
+        room = _SINGLE * max(abs(self.least), abs(self.greatest))
         low, high = self.proven or (self.least, self.greatest)
         return self.least < low - room or self.greatest > high + room
 
@@ -112,7 +118,7 @@ class Passed(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Campaign:
-    """What was run of what was `asked`: chunks of lanes in the order of their numbers, with what was seen of them.
+    """What was run of what was `asked`: vectors of lanes in the order of their numbers, with what was seen of them.
 
     `controller`: the exported C code, or its tables in floats.
     """
@@ -128,19 +134,34 @@ class Campaign:
         """What all runs share."""
         return self.attack.setting
 
+    @cached_property
+    def all(self) -> Found:
+        """Peaks of all lanes."""
+        return combined([seen.found for seen in self.found], lambda *parts: np.concatenate(parts, axis=-1))
+
     @property
     def runs(self) -> int:
         """How many were made."""
-        return sum(seen.N for seen in self.found)
-
-    def all(self, name: str) -> Array:
-        """A field of `Seen` by lanes, of all of them, lanes last."""
-        return np.concatenate([getattr(seen, name) for seen in self.found], axis=-1)
+        return len(self.all.stopped)
 
     @property
     def aimed(self) -> Flags:
         """Which lanes were adversaries, (N,)."""
         return np.arange(self.runs) < len(self.attack.aims)
+
+    @cached_property
+    def arrays(self) -> dict[str, Array]:
+        """Of every state, then of every input, and every lane, (n + m, N): the largest `share`, `when` in s, of what.
+
+        `value` of `bound`; and what each lane may be wrong by, as a share of a half-width, `error` (N,).
+        """
+        own, names = self.setting, self.setting.names
+        share = np.maximum(0.0, np.stack([self.all.peak[name] for name in names]))
+        when = np.stack([self.all.peak_time[name] for name in names])
+        samples = np.minimum((when / own.Ts + _ROUNDING).astype(np.int64), own.samples - 1)
+        bound = np.stack([own.at(samples[i])[i] for i in range(len(names))])
+        error = np.concatenate([seen.error for seen in self.found])
+        return {"share": share, "when": when, "value": share * bound, "bound": bound, "error": error}
 
     @property
     def profile(self) -> Array:
@@ -166,7 +187,7 @@ class Campaign:
     @property
     def error(self) -> float:
         """The largest error of an integration, as a share of a half-width."""
-        return float(_finite(self.all("slack").max()))
+        return float(_finite(self.arrays["error"].max()))
 
     @property
     def attained(self) -> float:
@@ -177,43 +198,50 @@ class Campaign:
         """Of a state or an input in some lanes (N,); None if there are none."""
         if not group.any():
             return None
-        return self._peak(index, int(np.argmax(np.where(group, self.all("share")[index], -1.0))))
+        return self._peak(index, int(np.argmax(np.where(group, self.arrays["share"][index], -1.0))))
 
     def _peak(self, index: int, number: int) -> Peak:
         names = ("share", "value", "bound", "when")
-        share, value, bound, t = (float(_finite(self.all(name)[index, number])) for name in names)
+        share, value, bound, t = (float(_finite(self.arrays[name][index, number])) for name in names)
         return Peak(share, value, bound, number, t)
 
     @property
     def went(self) -> dict[str, Went]:
         """Where every input was."""
         proven = {use.input: (float(use.range[0]), float(use.range[1])) for use in self.setting.result.inputs}
-        low = _finite(np.min([seen.low for seen in self.found], axis=0)).tolist()
-        high = _finite(np.max([seen.high for seen in self.found], axis=0)).tolist()
-        ends = zip(self.setting.spec.inputs, low, high, strict=True)
+        low, high = _finite(self.all.least.min(axis=1)), _finite(self.all.greatest.max(axis=1))
+        ends = zip(self.setting.spec.inputs, low.tolist(), high.tolist(), strict=True)
         return {name: Went(least, greatest, proven.get(name)) for name, least, greatest in ends}
 
     @property
     def passed(self) -> list[Passed]:
         """How near runs came to each obstacle, in their order."""
         proven = {own.index for own in self.setting.result.clearance if own.verdict is Verdict.CERTIFIED}
-        gaps = enumerate(_finite(self.all("near")))
-        return [Passed(float(near.min()), int(near.argmin()), i in proven) for i, near in gaps]
+        gaps = [_finite(-self.all.peak[gap(i)]) for i in range(len(self.setting.spec.obstacles))]
+        return [Passed(float(own.min()), int(own.argmin()), i in proven) for i, own in enumerate(gaps)]
 
-    @property
+    @cached_property
     def outside(self) -> list[int]:
-        """Runs that left the tube."""
-        return [int(number) for number in np.flatnonzero(np.isfinite(self.all("left")))]
+        """Runs that left the tube by more than their error and the rounding of the plan's inputs."""
+        own, n = self.setting, self.setting.loop.states
+        states, inputs = np.split(own.bounds.T, [n])
+        gain = np.max(abs(own.tables.N) @ states / inputs, axis=1)
+        error = np.where(np.isfinite(self.arrays["error"]), self.arrays["error"], 0.0)
+        most = max((max(abs(went.least), abs(went.greatest)) for went in self.went.values()), default=0.0)
+        room = np.concatenate([np.ones(n), gain])[:, None] * error
+        room[n:] += _SINGLE * most / inputs.min(axis=1)[:, None]
+        beyond = (self.arrays["share"] > 1 + _ROUNDING + room).any(axis=0) | (self.all.stopped == DIVERGED)
+        return np.flatnonzero(beyond).tolist()
 
     @property
     def violations(self) -> list[Violation]:
-        """How the first of them did."""
+        """How the first of them did, by what was furthest outside."""
         return [self._violation(number) for number in self.outside[:_LISTED]]
 
     def _violation(self, number: int) -> Violation:
-        names, aims, index = self.setting.names, self.attack.aims, int(self.all("what")[number])
-        aimed, left = names[aims[number, 2]] if number < len(aims) else "", float(self.all("left")[number])
-        return Violation(names[index], aimed, self._peak(index, number)._replace(t=left))
+        names, aims, index = self.setting.names, self.attack.aims, self.arrays["share"][:, number].argmax()
+        aimed = names[aims[number, 2]] if number < len(aims) else ""
+        return Violation(names[index], aimed, self._peak(int(index), number))
 
     @property
     def summary(self) -> dict[str, object]:

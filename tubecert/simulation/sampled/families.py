@@ -10,6 +10,7 @@ from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.loop_design.widths import flow
@@ -31,6 +32,12 @@ class Course(NamedTuple):
     held: Array
     ends: Array
     inputs: Callable[[float], Array] | None = None
+
+    def of(self, lanes: NDArray[np.intp]) -> Course:
+        """What some lanes follow."""
+        if len(self.ends) == 1:
+            return self
+        return self._replace(x=self.x[..., lanes], held=self.held[..., lanes], ends=self.ends[lanes])
 
 
 def course_of(setting: Setting) -> Course:

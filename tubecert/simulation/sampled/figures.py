@@ -17,13 +17,12 @@ if TYPE_CHECKING:
 
 _GROUPS: Final = (("random runs", COLORS["nominal"]), ("adversaries", COLORS["l1"]))
 _BOXES: Final = 400  # cross-sections of the tube that are drawn
-_KEPT: Final = ("share", "when", "value", "bound", "left", "slack")
 
 
 def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     """Beside its summary, figures only of what was not interrupted; the same campaign gives the same bytes."""
-    arrays = {name: campaign.all(name) for name in _KEPT} | {"names": np.array(campaign.setting.names)}
-    yield "runs.npz", npz({**arrays, "profile": campaign.profile, "aimed": campaign.aimed})
+    arrays = {**campaign.arrays, "profile": campaign.profile, "aimed": campaign.aimed}
+    yield "runs.npz", npz(arrays | {"names": np.array(campaign.setting.names)})
     if campaign.runs == campaign.asked:  # to draw takes longer than who is interrupted has
         yield from images(DRAWERS, campaign)
 
@@ -38,7 +37,7 @@ def _tube_use(campaign: Campaign) -> Figure:
     figure = blank(7.0, 0.9 + 1.5 * len(own.names))
     axes = figure.subplots(len(own.names), 1, sharex=True, squeeze=False)[:, 0]
     t = np.arange(own.samples) * own.Ts
-    bounds = np.hstack([own.at(k) for k in range(own.samples)])
+    bounds = own.at(np.arange(own.samples))
     for i, (axis, name) in enumerate(zip(axes, own.names, strict=True)):
         axis.fill_between(t, 0, bounds[i], step="post", color=TUBE, alpha=0.25, lw=0, label="tube")
         for (label, color), profile in zip(_GROUPS, campaign.profile, strict=True):
@@ -59,10 +58,10 @@ def _plane(campaign: Campaign) -> Figure | None:
     i, j = (own.spec.states.index(name) for name in names)
     plan, boxes = None, list[Array]()
     if own.spec.trajectory.bundle is None:
-        plan = campaign.found[0].course.x[:: len(own.lengths), [i, j], 0]
+        plan = campaign.found[0].plan[:, [i, j]]
         shown = np.unique(np.linspace(0, own.samples - 1, _BOXES).astype(int))
         corners: Array = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
-        boxes = [plan[k] + corners * own.at(k)[[i, j], 0] for k in shown]
+        boxes = [plan[k] + corners * own.at(k)[[i, j]] for k in shown]
     figure, axis = plane(own.spec, names, boxes, plan)
     path = campaign.found[0].path
     axis.plot(path[:, i], path[:, j], color=COLORS["l1"], lw=0.5, alpha=0.5)

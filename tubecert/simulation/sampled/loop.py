@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Mapping
+from math import ceil
 from typing import Final, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.setting import Controller
+from tubecert.simulation.halving import Places
+from tubecert.simulation.lanes import SHARES, Found, Steps
 from tubecert.simulation.obstacles import in_plane, signed_distance
-from tubecert.simulation.plans import integrated
-from tubecert.simulation.sampled.attack import Attack, Flags, Lanes
-from tubecert.simulation.sampled.families import Course
+from tubecert.simulation.sampled.attack import Attack, Lanes
+from tubecert.simulation.sampled.families import Course, course_of, courses
 from tubecert.simulation.sampled.setting import Setting
 
-_ROUNDING: Final = 1e-9  # of a bound: that of floats
-_APART: Final = 16  # numbers of runs that are drawn
-_DRAWN: Final = 512  # of the first
-SINGLE: Final = 2.0**-22
-"""Of an input: how far that of a plan in single precision is off."""
-
+_PACE: Final = 0.15  # |A| times the length of a step of the first level
+_OUTPUTS: Final = 250  # times at which runs are compared, and drawn
+_LIMIT: Final = 100  # shares of what is proven, beyond which nobody is followed
+NOBODYS, DIVERGED = -1, 1  # why a lane is stopped: its plan is none of its family, or it is far outside
 
 Step: TypeAlias = Callable[[Array, Array, Array], Array]
 """Inputs (m, N) for measurements y (n, N), the plan's x* (n, N or 1) now and its u* (m, N or 1) when they act."""
@@ -43,115 +43,131 @@ def linear(tables: Controller, lanes: int) -> Step:
     return step
 
 
-class Seen:
-    """What is seen of N lanes, which count as long as their plan is one of its family.
+class Sampled:
+    """Some lanes in the steps of a level: a `lanes.System`. All parts of all samples have `count` steps.
 
-    Of every state |x - x*| / W, of every input |u - u*| / U, (n + m, N): `share`, the largest, at `when` in s, `value`
-    of `bound`. `profile` (2, n + m, K): the largest by sample, of random lanes and of adversaries. `left` (N,): when a
-    lane was first seen outside, in s (else infinite), by `what`; `slack` (N,): the error of the integration, of the
-    tube. Inputs went from `low` to `high` (m,). `path` (K, n, D): some lanes by samples, at the ends of these. `near`
-    (O, N): how near lanes came to obstacles.
+    What is seen, at the ends of parts: `x`, `share` (n + m, N) of |x - x*| and of |u - u*| of the last command, that
+    command `u`, distances from obstacles `near` (O, N). `profile` (2, n + m, K): the largest share by sample, of random
+    lanes and of adversaries.
     """
 
-    def __init__(self, setting: Setting, lanes: Lanes, course: Course) -> None:
-        self.setting, self.lanes, self.course, self.N = setting, lanes, course, len(lanes.aimed)
-        n, m = setting.loop.B.shape
-        self.share, self.when, self.value, self.bound = np.zeros((4, n + m, self.N))
-        self.profile = np.zeros((2, n + m, setting.samples))
-        self.left, self.what, self.slack = np.full(self.N, np.inf), np.zeros(self.N, int), np.zeros(self.N)
-        self.low, self.high = np.full(m, np.inf), np.full(m, -np.inf)
-        self.drawn = np.flatnonzero((lanes.number % _APART == 0) & (lanes.number < _DRAWN))
-        self.path = np.zeros((setting.samples, n, len(self.drawn)))
-        self.near = np.full((len(setting.spec.obstacles), self.N), np.inf)
+    kept = ("x",)
 
-    def sample(self, k: int, delta: Array, planned: Array, error: Array) -> None:
-        """The commands of sample k: u - u*, and u*, as they are held (m, N); `error` of the states (n, N)."""
-        own, n = self.setting, len(error)
-        error = abs(own.tables.N) @ error + SINGLE * abs(planned)
-        self._see(k * own.Ts, k, slice(n, None), delta, error)
-        u = (planned + delta)[:, self._counts(k)]
-        self.low = np.minimum(self.low, u.min(axis=1, initial=np.inf))
-        self.high = np.maximum(self.high, u.max(axis=1, initial=-np.inf))
+    def __init__(self, attack: Attack, lanes: Lanes, course: Course, made: Controllers, count: int) -> None:
+        self._attack, self._own, self._lanes, self._course = attack, attack.setting, lanes, course
+        self._made, self._count, own = made, count, attack.setting
+        parts = (
+            np.array(own.nodes[:-1], dtype=float)[:, None] + own.lengths[:, None] * np.arange(count) / count
+        )
+        start = np.append(np.add.outer(np.arange(own.samples) * own.Ts, parts.ravel()), own.samples * own.Ts)
+        length = np.append(np.tile(np.repeat(own.lengths / count, count), own.samples), 0.0)
+        self.steps = Steps(start, length, outputs(own) * parts.size)
+        self.profile = np.zeros((2, len(own.names), own.samples))
 
-    def states(self, t: float, k: int, x: Array, plan: Array, error: Array) -> None:
-        """Where lanes are at t, within sample k or at its ends, and their plan, (n, N or 1)."""
-        own, counts, self.path[k] = self.setting, self._counts(k), x[:, self.drawn]
-        self._see(t, k, slice(len(x)), x - plan, error)
-        for i, obstacle in enumerate(own.spec.obstacles):
-            gap = signed_distance(obstacle, in_plane(own.spec, obstacle, x.T))
-            self.near[i] = np.where(counts, np.fmin(self.near[i], gap), self.near[i])
-        slack = (error / own.at(k)[: len(x)]).max(axis=0)
-        self.slack = np.where(counts, np.fmax(self.slack, slack), self.slack)
+    def start(self) -> Array:
+        """x (n, N) at the start."""
+        N = len(self._lanes.number)
+        self.stopped = np.zeros(N, dtype=np.int64)
+        self._controller, self._goal = self._made(N), self._attack.sent(self._lanes, -1)
+        nothing = np.zeros((self._own.loop.inputs, N))
+        self._queue = [nothing] * (
+            self._own.loop.whole + 2
+        )  # what commands add to the plan's, the last one first
+        return np.asarray(self._course.x[0] + self._lanes.off)
 
-    def _counts(self, k: int) -> Flags:
-        return np.asarray(k < self.course.ends + np.zeros(self.N))
-
-    def _see(self, t: float, k: int, rows: slice, off: Array, error: Array) -> None:
-        """Deviations (c, N) of states or inputs, not known better than by `error` (c, N)."""
-        value, bound = np.where(self._counts(k), abs(off), 0.0), self.setting.at(k)[rows]
-        share = value / bound
-        more = ~(share <= self.share[rows])  # what is no number is more than any
-        for name, found in (("share", share), ("when", t), ("value", value), ("bound", bound)):
-            kept = getattr(self, name)
-            kept[rows] = np.where(more, found, kept[rows])
-        outside = ~(value - error <= bound * (1 + _ROUNDING))
-        new = outside.any(axis=0) & np.isinf(self.left)
-        self.left[new], self.what[new] = t, (rows.start or 0) + outside.argmax(axis=0)[new]
-        for group, profile in zip(
-            (~self.lanes.aimed, self.lanes.aimed), self.profile[:, rows, k], strict=True
-        ):
-            np.maximum(profile, np.where(group, share, 0.0).max(axis=1), out=profile)
-
-
-class _Twin:
-    """The lanes of one integration: states x (n, N), the controller, what its commands add to the plan's inputs."""
-
-    def __init__(self, setting: Setting, controller: Step, x: Array, count: int) -> None:
-        self.controller, self.x, self.count = controller, x, count
-        self.queue = [np.zeros((setting.loop.inputs, x.shape[1]))] * (
-            setting.loop.whole + 2
-        )  # the last one first
-
-    def sample(self, noise: Array, plan: Array, planned: Array) -> Array:
-        """The computer reads its sensors: what it adds (m, N)."""
-        delta = self.controller(self.x + noise, plan, planned) - planned
-        self.queue = [delta, *self.queue[:-1]]
-        return delta
-
-
-def run(attack: Attack, lanes: Lanes, course: Course, made: Controllers, count: int) -> Seen:
-    """Integrates all lanes twice, by `count` steps of RK4 in each part of a sample, and by twice as many.
-
-    What is seen is the second; the difference, about 15 times what the fourth order leaves, is its error.
-    """
-    own, seen, start = attack.setting, Seen(attack.setting, lanes, course), course.x[0] + lanes.off
-    twins = [_Twin(own, made(seen.N), start, finer * count) for finer in (1, 2)]
-    parts, whole, m = len(own.lengths), own.loop.whole, own.loop.inputs
-    error, goal = np.zeros_like(start), attack.sent(lanes, -1)
-
-    def slope(k: int, ramp: tuple[Array, Array], pushes: Array, t: float, x: Array) -> Array:
-        forces = pushes + own.spread @ (ramp[0] + (t / own.Ts - k) * (ramp[1] - ramp[0]))
-        if course.inputs is not None:
-            forces[:m] += course.inputs(t)
+    def at(self, step: int, stage: int, x: Array) -> Array:
+        """f + B (u + h) + E w, (n, N)."""
+        node, inner = divmod(step, self._count)
+        if stage == 0 and inner == 0 and step < len(self.steps.start) - 1:
+            self._enter(*divmod(node, len(self._own.lengths)), x)
+        own, t = self._own, float(self.steps.start[step] + SHARES[stage] * self.steps.length[step])
+        now, goal = self._ramp
+        forces = self._pushes + own.spread @ (now + (t / own.Ts - self._sample) * (goal - now))
+        m = own.loop.inputs
+        if self._course.inputs is not None:
+            forces[:m] += self._course.inputs(t)
         if own.own is not None:
-            h = own.own.run_floats_silenced([*x, np.full(1, t)], (seen.N,))
-            forces[:m] += np.where(lanes.own, h, 0.0)
-        return own.plant.run_floats_silenced([*x, *lanes.parameters, *forces], (seen.N,))
+            h = own.own.run_floats_silenced([*x, np.full(1, t)], x.shape[1:])
+            forces[:m] += np.where(self._lanes.own, h, 0.0)
+        return own.plant.run_floats_silenced([*x, *self._lanes.parameters, *forces], x.shape[1:])
 
-    with np.errstate(all="ignore"):  # a run that diverges has left its tube before
-        for k in range(own.samples):
-            now, goal = goal, attack.sent(lanes, k, goal)
-            plan, planned, noise = course.x[k * parts], course.held[k + whole + 1], attack.noise(lanes, k)
-            seen.states(k * own.Ts, k, twins[1].x, plan, error)
-            delta = [twin.sample(noise, plan, planned) for twin in twins][1]
-            seen.sample(k, delta, planned, error)
-            for part, length in enumerate(own.lengths.tolist()):
-                late, t = part < own.acts, k * own.Ts + float(own.nodes[part])
-                held = 0.0 if course.inputs is not None else course.held[k if late else k + 1]
-                wind = attack.wind(lanes, k, part)
-                for twin in twins:
-                    pushes = np.vstack([held + twin.queue[whole + late], wind])
-                    twin.x = integrated(partial(slope, k, (now, goal), pushes), t, twin.x, length, twin.count)
-                error = np.maximum(error, abs(twins[1].x - twins[0].x))
-                seen.states(t + length, k, twins[1].x, course.x[k * parts + part + 1], error)
-    return seen
+    def _enter(self, k: int, part: int, x: Array) -> None:
+        """What acts in a part of sample k; at its start the computer reads its sensors."""
+        own, course, attack, lanes = self._own, self._course, self._attack, self._lanes
+        if part == 0:
+            self._sample, now = k, self._goal
+            self._goal = attack.sent(lanes, k, now)
+            self._ramp = now, self._goal
+            self._planned = course.held[k + own.loop.whole + 1]
+            measured = x + attack.noise(lanes, k)
+            delta = self._controller(measured, course.x[k * len(own.lengths)], self._planned) - self._planned
+            self._queue = [delta, *self._queue[:-1]]
+            self.stopped[(self.stopped == 0) & (k >= course.ends)] = NOBODYS
+        late = part < own.acts
+        held = 0.0 if course.inputs is not None else course.held[k if late else k + 1]
+        pushed = held + self._queue[own.loop.whole + late]
+        self._pushes = np.vstack([pushed, attack.wind(lanes, k, part)])
+
+    def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
+        """What is seen at the start of a step; within a part what was seen before."""
+        node, inner = divmod(step, self._count)
+        if inner == 0:
+            own, spec, delta = self._own, self._own.spec, self._queue[0]
+            share = np.vstack([abs(x - self._course.x[node]), abs(delta)]) / own.at(self._sample)[:, None]
+            share = np.nan_to_num(share, nan=np.inf)
+            self.stopped[(self.stopped == 0) & (share.max(axis=0) > _LIMIT)] = DIVERGED
+            live, aimed = self.stopped == 0, self._lanes.aimed
+            for profile, group in zip(
+                self.profile[..., self._sample], (live & ~aimed, live & aimed), strict=True
+            ):
+                np.maximum(profile, np.where(group, share, 0.0).max(axis=1), out=profile)
+            gaps = [signed_distance(obstacle, in_plane(spec, obstacle, x.T)) for obstacle in spec.obstacles]
+            near = np.array(gaps).reshape(-1, x.shape[1])
+            self._seen = {"x": x, "share": share, "u": self._planned + delta, "near": near}
+        return self._seen
+
+    def step(self, step: int) -> float:
+        """Nothing goes on beside x."""
+        return 0.0
+
+    def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
+        """What peaks are taken of: shares by state and input, and how near obstacles are, the less the larger."""
+        shares = {name: rows["share"][:, i] for i, name in enumerate(self._own.names)}
+        return shares | {gap(i): -rows["near"][:, i] for i in range(rows["near"].shape[1])}
+
+
+def gap(obstacle: int) -> str:
+    """The name of the peak of an obstacle."""
+    return f"obstacle {obstacle}"
+
+
+def outputs(setting: Setting) -> NDArray[np.int64]:
+    """Numbers of the samples at whose start runs are compared, (K,), and of the one after the last."""
+    return np.unique(np.linspace(0, setting.samples, _OUTPUTS + 1).astype(np.int64))
+
+
+class Vector:
+    """Lanes of an attack, whose steps can be made shorter: a `halving.Family`."""
+
+    def __init__(self, attack: Attack, lanes: Lanes, made: Controllers) -> None:
+        own, bundle = attack.setting, attack.setting.spec.trajectory.bundle
+        self._attack, self._lanes, self._made, self.N = attack, lanes, made, len(lanes.number)
+        self.course = course_of(own) if bundle is None else courses(own, bundle, lanes.draws.plan)
+        self.times = np.asarray(outputs(own) * own.Ts, dtype=float)
+        self.profile = np.zeros((2, len(own.names), own.samples))
+        size = float(abs(own.loop.A).sum(axis=1).max() * own.lengths.max())
+        self._count = max(1, ceil(size / _PACE))
+
+    def system(self, lanes: Places, level: int) -> Sampled:
+        """Some of the lanes at a level."""
+        own, course = self._lanes.of(lanes), self.course.of(lanes)
+        system = Sampled(self._attack, own, course, self._made, self._count * 2**level)
+        self.profile = system.profile if len(lanes) == self.N else np.maximum(self.profile, system.profile)
+        return system
+
+    def apart(self, finer: Found, coarser: Found) -> tuple[Array, Array]:
+        """Differences of states in shares of what is proven; lanes whose plan is over are not apart."""
+        own = self._attack.setting
+        bounds = own.at(np.minimum(outputs(own), own.samples - 1)).T[:, : own.loop.states, None]
+        shares = abs(finer.seen["x"] - coarser.seen["x"]) / bounds
+        return np.nan_to_num(shares).max(axis=1), np.zeros(shares.shape[2])

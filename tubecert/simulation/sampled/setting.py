@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from math import ceil
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
@@ -25,7 +27,7 @@ _MEMORIES: Final = 2  # of the loop, that a run lasts where the claim is for eve
 _SAMPLES: Final = (50, 20_000)  # of such a run, at least and at most
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Setting:
     """All of a simulation that its runs share: n states, m inputs, k columns of the wind, p parameters.
 
@@ -57,30 +59,30 @@ class Setting:
         """States, then inputs."""
         return *self.spec.states, *self.spec.inputs
 
-    @property
+    @cached_property
     def Ts(self) -> float:
         """The sample time in s."""
         return float(self.loop.sample_time)
 
-    @property
+    @cached_property
     def lengths(self) -> Array:
         """Of the parts of a sample, in s."""
         return np.diff(np.array(self.nodes, dtype=float))
 
-    @property
+    @cached_property
     def acts(self) -> int:
         """The part with which the input changes."""
         return self.nodes.index(self.loop.rest)
 
-    @property
+    @cached_property
     def gusts(self) -> Size:
         """The wind that may jump, (k,)."""
         own = self.loop.gusts
         return Size(0 * own.each, length=False) if self.loop.sways else own
 
-    def at(self, sample: int) -> Array:
-        """The bounds (n + m, 1) of a sample."""
-        return np.asarray(self.bounds[np.searchsorted(self.stages, sample, side="right") - 1][:, None])
+    def at(self, sample: int | NDArray[np.int64]) -> Array:
+        """The bounds (n + m,) of a sample, or (n + m, ..) of several."""
+        return np.asarray(self.bounds[np.searchsorted(self.stages, sample, side="right") - 1].T)
 
 
 def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> Setting:
