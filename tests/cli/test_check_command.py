@@ -254,7 +254,7 @@ def test_github_is_detected_and_gets_a_summary(monkeypatch, tmp_path):
     assert result.exit_code == 1
     assert result.stdout.startswith("::error file=spec.yaml,line=")
     summary = (tmp_path / "summary.md").read_text("utf-8")
-    assert summary.startswith("before\n### tubecert check\n")
+    assert summary.startswith("before\n# tubecert: warning\n")
     assert "| TC302 |" in summary
     assert json.loads(run(path, "--json").stdout)[0]["code"] == "TC302"
     assert run(path, "--format", "text").stdout.startswith("spec.yaml:")

@@ -298,9 +298,9 @@ def points(path):
 @pytest.mark.slow
 def test_which_figures_there_are(orbit, regulated, outside):
     gains = {"trade-off"}
-    assert set(figures(orbit)) == gains | {"tube-0-1", "suprema-0-1", "state-0", "state-1", "input-0"}
+    assert set(figures(orbit)) == gains | {"tube-0-1", "state-0", "state-1", "input-0"}
     over_time = {"state-0", "state-1", "state-2", "input-0"}
-    planes = {f"{w}-{p}" for w in ("tube", "suprema") for p in ("0-1", "0-2", "1-2")}
+    planes = {f"tube-{pair}" for pair in ("0-1", "0-2", "1-2")}
     assert set(figures(regulated)) == gains | over_time | planes
     assert set(figures(outside)) == over_time | {"tube-0-1", "tube-0-2", "tube-1-2"}
 
@@ -334,13 +334,6 @@ def test_the_tube_of_a_constant_metric_is_an_ellipse_as_wide_as_its_half_widths(
     x = [row[0] for row in orbit["notes"]["plan"]["samples"]["x"]]
     for place, value in zip(places, x, strict=True):
         assert place[0] == pytest.approx(float(safe.get("x")) + (value - low) * unit[0], abs=0.02)
-
-
-def test_the_constants_are_bounded_over_the_whole_ball(orbit):
-    drawing = drawn(orbit, "suprema-0-1")
-    rho = orbit["result"]["tube"]["rho"]
-    for reach, unit in zip(swept(drawing), units(drawing, orbit, ("x1", "x2")), strict=True):
-        assert reach == pytest.approx(rho * unit, rel=1e-4)
 
 
 def test_every_state_over_time_has_its_half_width(orbit):
@@ -380,19 +373,6 @@ def test_chosen_pairs_lie_on_their_curves(regulated):
         here = float(dot.get("cx")), float(dot.get("cy"))
         assert min(math.dist(p, here) for p in curves[dot.get("class").split()[1]]) < 25
     assert sum("decides" in x.get("class") for x in dots) == 1
-
-
-def test_numbers_in_the_figures_of_suprema_are_explained(orbit):
-    (block,) = (b for b in section(orbit, "constants").blocks if b.block == "figures")
-    words = " ".join(block.places)
-    for name, item in orbit["result"]["constants"].items():
-        if "at" in orbit["notes"]["constants"][name] and item["above"]:
-            assert EVERY[name].symbol in words, name
-    badges = (
-        x for x in pages.ET.fromstring(block.figures[0].svg).iter("text") if "badge" in x.get("class", "")
-    )
-    shown = {n for x in badges for n in x.text.rstrip("+").split(",")}
-    assert shown <= {str(i + 1) for i in range(len(block.places))}
 
 
 def test_one_state_is_drawn_against_time():

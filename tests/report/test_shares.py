@@ -7,7 +7,7 @@ from proven import proven
 
 from tubecert.certificate.result import Certificate
 from tubecert.digits import exact
-from tubecert.report.certificate_page import beyond_its_theorem, less_by_distance
+from tubecert.report.certificate_brief import beyond_its_theorem, less_by_distance
 from tubecert.report.gains import rows
 from tubecert.report.shares import filled
 

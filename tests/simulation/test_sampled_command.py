@@ -44,7 +44,7 @@ def test_the_same_from_code_of_a_family(files):
     assert isinstance(found, tc.SampledSimulation)
     assert not found.falsified
     assert "<SampledSimulation: not falsified pendulum" in repr(found)
-    assert "largest share" in found._repr_html_()
+    assert "attained" in found._repr_html_()
     assert found.figure("plane").axes
     names = found.save("a")
     assert found.save("b") == names

@@ -6,14 +6,14 @@ That of a sampled loop whose table has another sign is in tests/simulation/test_
 import re
 from dataclasses import replace
 from fractions import Fraction
-from io import StringIO
 
 import pytest
-from rich.console import Console
 from simulated import setting
 
 from tubecert.library.simulating import RUNS
-from tubecert.report.simulation import report
+from tubecert.report.simulation import page_of
+from tubecert.report.terminal import Terminal
+from tubecert.report.text import screen
 from tubecert.simulation.adaptive.campaign import simulate
 from tubecert.simulation.adaptive.record import summary
 from tubecert.simulation.adaptive.setting import Choice, loop_of
@@ -61,10 +61,10 @@ def test_a_lie_is_found_with_seed_run_and_time(name, lie, bound):
     assert bound in {item.bound_of for item in aimed}
     broken = next(item for item in random if item.bound_of == bound)
     assert broken.value > broken.bound
-    console = Console(file=StringIO(), width=200)
-    console.print(*report(found, folder="x", files=[], verbose=True))
-    told = console.file.getvalue()
-    assert re.search(rf"VIOLATION.* t = \S+ s, random run {broken.run}, seed {SEED}\n", told, re.DOTALL), told
+    told = Terminal(stream=None, colored=False, width=120, interactive=False).text(
+        screen(page_of(found), [], verbose=True)
+    )
+    assert re.search(rf"falsified l1, .* t = \S+ s, random run {broken.run}, seed {SEED}\n", told), told
     again = simulate(own, [loop], count=0, seed=SEED, replay=broken.run).drawn[0].comparison
     same = next(item for item in again.violations if item.bound_of == bound)
     assert same.value == pytest.approx(broken.value, rel=1e-2)

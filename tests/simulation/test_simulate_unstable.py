@@ -10,7 +10,9 @@ from simulated import runs as runs_by_hand
 from systems import matrix_of, plain_model
 
 from tubecert.expression import exp, symbol
-from tubecert.report.simulation import report, verdict_line
+from tubecert.report.simulation import page_of
+from tubecert.report.terminal import Terminal
+from tubecert.report.text import screen
 from tubecert.simulation.adaptive.campaign import SPECIFIED, Campaign, Drawn, simulate
 from tubecert.simulation.adaptive.judge import compare
 from tubecert.simulation.adaptive.loops import Disturbance, LoopProblem
@@ -70,10 +72,8 @@ def thinner(where, factor):
 
 def words_of(campaign):
     data = summary(campaign, "none")
-    parts = [verdict_line(data), *report(data, folder="x", files=(), verbose=False)]
-    return data.to_json(), "\n".join(
-        getattr(part, "plain", getattr(getattr(part, "renderable", None), "plain", "")) for part in parts
-    )
+    terminal = Terminal(stream=None, colored=False, width=200, interactive=False)
+    return data.to_json(), terminal.text(screen(page_of(data), [], verbose=False))
 
 
 @pytest.mark.slow

@@ -251,7 +251,7 @@ def test_a_lying_solver_writes_no_file(kind, tmp_path, monkeypatch):
     target = tmp_path / "metric.json"
     target.write_text("old")
     spec = str(ROOT / "configs" / "two_state.yaml")
-    done = CliRunner().invoke(app, ["synth", spec, "--rate", "1.7", "--degree", "0", "-o", str(target)])
+    done = CliRunner().invoke(app, ["synth", spec, "--rate", "1.7", "--degree", "0", "-v", "-o", str(target)])
     assert done.exit_code == 4
     assert target.read_text() == "old"
     assert "undecided two_state" in done.output

@@ -219,9 +219,8 @@ def _show(
 ) -> None:
     """The page on stdout, with `files` by what they are; or the certificate, with the verdict line on stderr."""
     from tubecert.library.stated import page_of
-    from tubecert.report import text
 
     closing, page = list(files), page_of(found.certificate, all_of_it=output.verbose)
     target = dict(closing)["certificate"]
     data = found.text if output.json or target == certificate.STDOUT else None
-    present(output, text.headline(page), lambda: text.screen(page, closing, verbose=output.verbose), data)
+    present(output, page, closing, data)

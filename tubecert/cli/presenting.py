@@ -1,8 +1,7 @@
-"""What a command found, on stdout: a report for people, or data for programs."""
+"""What a command found, on stdout: a page for people, or data for programs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from tubecert.cli import keeper
@@ -11,29 +10,28 @@ from tubecert.cli.options import Output
 from tubecert.report.terminal import Terminal
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from tubecert.report.page import Page
+    from tubecert.report.text import Rows
 
 
-def present(
-    output: Output,
-    verdict: RenderableType,
-    report: Callable[[], Sequence[RenderableType]],
-    data: str | None = None,
-) -> None:
-    """Shows the report (with `--quiet` only the verdict); or writes `data`, with the verdict on stderr."""
-    write_stdout(text_of(output, verdict, report, data))
+def present(output: Output, page: Page, closing: Rows = (), data: str | None = None) -> None:
+    """Shows the page, then files and next commands (with `--quiet` its headline alone); or writes `data`.
+
+    With `data` the headline is on stderr.
+    """
+    from tubecert.report.text import headline
+
+    write_stdout(text_of(output, page, closing, data))
     if data is not None and not output.quiet:
-        Terminal.stderr(color=output.color).show(verdict)
+        Terminal.stderr(color=output.color).show(headline(page))
     keeper.tell({"said": True})
 
 
-def text_of(
-    output: Output,
-    verdict: RenderableType,
-    report: Callable[[], Sequence[RenderableType]],
-    data: str | None = None,
-) -> str:
+def text_of(output: Output, page: Page, closing: Rows, data: str | None = None) -> str:
     """What `present` writes to stdout."""
+    from tubecert.report.text import headline, screen
+
     if data is not None:
         return data
-    return Terminal.stdout(color=output.color).text(verdict if output.quiet else report())
+    shown = [headline(page)] if output.quiet else screen(page, closing, verbose=output.verbose)
+    return Terminal.stdout(color=output.color).text(shown)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import shlex
+from dataclasses import dataclass, replace
 
 from tubecert.certificate.file import FORMAT, parse
 from tubecert.cli import keeper, telling
-from tubecert.cli.guard import write_stdout
 from tubecert.cli.options import Output
+from tubecert.cli.presenting import present
 from tubecert.errors import ExitCode
 from tubecert.library.numbers import Numbers
-from tubecert.library.rechecking import text_of, told, verdict_line, with_controller
-from tubecert.printable import harmless, printable_json, visible
+from tubecert.library.rechecking import text_of, told, with_controller
+from tubecert.printable import printable_json
 from tubecert.recheck import document
-from tubecert.recheck.cover import Outcome
 from tubecert.recheck.run import BUDGET, Examined, Recheck, recheck
+from tubecert.report.rechecked import page_of
 from tubecert.sampled_loop.record import FORMAT as SAMPLED
 
 
@@ -48,14 +49,20 @@ def run(given: Given, output: Output) -> ExitCode:
         found = recheck(text, name, most, report, seconds=limit, heard=_heard)
     if given.controller is not None:
         found = with_controller(found, text, name, given.controller)
-    shown = _as_json(found, name, note) if output.json else _as_text(found, name, note, output)
-    write_stdout(shown)
-    keeper.tell({"said": True})
+    data = _as_json(found, name, note) if output.json else None
+    present(replace(output, quiet=output.quiet or output.json), page_of(found, name, note), _next(name), data)
     return found.exit_code
 
 
+def _next(name: str) -> list[tuple[str, str]]:
+    return [
+        ("more", f"-v here; tubecert report {shlex.quote(name)}: what is certified, as a page with figures")
+    ]
+
+
 def _heard(item: Examined) -> None:
-    telling.found(_line(item.name, item.outcome, verbose=False).strip())
+    why = "" if item.outcome.holds else f": {item.outcome.why}"
+    telling.found(f"{item.outcome.verdict:<12}  {item.name}{why}")
 
 
 def _specification(path: str, text: str, name: str) -> str:
@@ -88,26 +95,3 @@ def _as_json(found: Recheck, name: str, note: str) -> str:
         **({"specification": note} if note else {}),
     }
     return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
-
-
-def _as_text(found: Recheck, name: str, note: str, output: Output) -> str:
-    failing = found.failing
-    lines = [verdict_line(found, name)]
-    if failing is not None:
-        lines.append(f"  first failing claim: {failing.name}: {failing.outcome.why}")
-    elif found.stated != "certified":
-        lines.append("  what can be examined of it agrees; it certifies nothing")
-    lines += [f"  {note}"] if note else []
-    if not output.quiet:
-        lines.append("")
-        lines += [_line(item.name, item.outcome, verbose=output.verbose) for item in found.claims]
-        lines += ["", f"  {found.hash}"]
-        if found.unread:
-            lines.append(f"  for orientation, not examined: {', '.join(found.unread)}")
-    return "".join(f"{harmless(visible(line))}\n" for line in lines)
-
-
-def _line(name: str, outcome: Outcome, *, verbose: bool) -> str:
-    work = f"  ({outcome.boxes} boxes)" if verbose and outcome.boxes else ""
-    why = "" if outcome.holds else f": {outcome.why}"
-    return f"  {outcome.verdict:<12}  {name}{work}{why}"

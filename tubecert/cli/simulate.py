@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -82,8 +83,7 @@ def run(given: Given, output: Output) -> ExitCode:
     wishes = wishes_of(system, numbers, chosen, given.gains, given.plan)
     folder = _folder(given)
     executor = workers_of(jobs, given.scheduler, "--scheduler") or Serial()
-    from tubecert.report.simulation import report as report_of
-    from tubecert.report.simulation import verdict_line
+    from tubecert.report import simulation as told
     from tubecert.simulation.adaptive.files import write
     from tubecert.simulation.adaptive.record import summary
     from tubecert.simulation.folder import prepared
@@ -97,12 +97,8 @@ def run(given: Given, output: Output) -> ExitCode:
             report(Step(phase=Phase.FIGURES))
         files = write(folder, campaign, certificate=certified.hash)
     data = summary(campaign, certified.hash)
-    present(
-        output,
-        verdict_line(data),
-        lambda: report_of(data, folder=folder, files=files, verbose=output.verbose),
-        _json(data.to_json()) if output.json else None,
-    )
+    page, closing = told.page_of(data), _closing(given, folder, files)
+    present(output, page, closing, _json(data.to_json()) if output.json else None)
     return _CODES.get(data.outcome, ExitCode.CERTIFIED)
 
 
@@ -111,8 +107,7 @@ def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Out
     from tubecert.library.reading import read
     from tubecert.library.sampled import SampledCertification, certified
     from tubecert.library.simulating import sampled_of
-    from tubecert.report.sampled_simulation import report as report_of
-    from tubecert.report.sampled_simulation import verdict_line
+    from tubecert.report import sampled_simulation as told
     from tubecert.simulation.folder import prepared
 
     words = {name: getattr(given, name) for name in ("metric", "scheduler", "controllers", "gains", "plan")}
@@ -130,13 +125,18 @@ def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Out
             raise foreign(str(given.certificate), what)
         simulation = sampled_of(found, system, numbers, report)
         files = simulation.save(folder)
-    present(
-        output,
-        verdict_line(simulation.campaign),
-        lambda: report_of(simulation.campaign, folder=folder, files=files, verbose=output.verbose),
-        _json(simulation.summary) if output.json else None,
-    )
+    page, closing = told.page_of(simulation.campaign), _closing(given, folder, files)
+    present(output, page, closing, _json(simulation.summary) if output.json else None)
     return _CODES.get(simulation.outcome, ExitCode.CERTIFIED)
+
+
+def _closing(given: Given, folder: str, files: Sequence[str]) -> list[tuple[str, str]]:
+    """What was written, and the command that shows it beside what is proven."""
+    certified = given.certificate or Path(folder) / "certificate.json"
+    command = shlex.join(
+        ["tubecert", "report", str(certified), "--simulation", folder, "-o", f"{folder}.html"]
+    )
+    return [("files", f"{folder}: {', '.join(files)}"), ("next", command)]
 
 
 def _folder(given: Given) -> str:

@@ -18,7 +18,7 @@ from tubecert.errors import ExitCode
 from tubecert.library.numbers import Numbers
 from tubecert.library.sweeping import Swept, axes_of, swept
 from tubecert.library.workers import cluster_at
-from tubecert.printable import printable_json, visible
+from tubecert.printable import printable_json
 from tubecert.records import exact_json
 from tubecert.report import sweep as told
 from tubecert.report.terminal import Terminal
@@ -67,19 +67,16 @@ def run(given: Given, output: Output) -> ExitCode:
         found = swept(task, axes, cluster, jobs or 1, report, parquet=given.parquet, named=flag)
     table = found.table
     data = printable_json(json.dumps(_rows(table), indent=1, ensure_ascii=False)) + "\n"
-    present(
-        output, told.summary(table), lambda: told.report(table, _files(found)), data if output.json else None
-    )
+    present(output, told.page_of(table), _files(found), data if output.json else None)
     return ExitCode.INTERNAL if found.broken else ExitCode.CERTIFIED
 
 
-def _files(found: Swept) -> list[str]:
-    """What was written, in words."""
+def _files(found: Swept) -> list[tuple[str, str]]:
+    """What was written."""
     names = [name for name in found.files if not name.startswith("figures/")]
     drawn = len(found.files) - len(names)
-    tables = [f"table {visible(str(found.folder / name))}" for name in sorted(names, key=_PAGE.__eq__)[:-1]]
-    page = f"page {visible(str(found.folder / _PAGE))}"
-    return [*tables, page + (f", and {drawn} figures (SVG) in figures/" if drawn else "")]
+    rows = [("page" if name == _PAGE else "table", str(found.folder / name)) for name in sorted(names)]
+    return rows + ([("figures", f"{found.folder / 'figures'}: {drawn} drawings (SVG)")] if drawn else [])
 
 
 def _options(given: Given, numbers: Numbers) -> pipeline.Options:

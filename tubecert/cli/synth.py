@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,14 +16,14 @@ from tubecert.cli.settings import settings_of
 from tubecert.cli.targets import deadline_after, plan_of, refused, spare
 from tubecert.errors import ExitCode
 from tubecert.library.asked import SynthesisNumbers, Wishes, one_of, synthesis_numbers, wanted_of
+from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
 from tubecert.spec.metric import COORDINATES
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-    from rich.text import Text
-
     from tubecert.pipeline.synthesised import Synthesised
+    from tubecert.report.page import Page
+    from tubecert.report.text import Rows
     from tubecert.spec import Spec
 
 
@@ -107,10 +108,10 @@ def _will(found: Synthesised, system: Spec, target: str, output: Output) -> keep
 
 def _tell(found: Synthesised, system: Spec, terminal: Terminal, output: Output) -> None:
     """The verdict, before advice is looked for."""
-    from tubecert.report import synthesis
+    from tubecert.report import synthesis, text
 
     if not output.quiet:
-        terminal.show(synthesis.verdict_line(found.search(), found.file, system.name))
+        terminal.show(text.headline(synthesis.page_of(found.search(), found.file, system.name)))
 
 
 def _wishes(given: Given, numbers: SynthesisNumbers) -> Wishes:
@@ -135,16 +136,16 @@ def _report(found: Synthesised, system: Spec, target: str, output: Output) -> No
 
 def _presented(
     found: Synthesised, system: Spec, target: str, output: Output
-) -> tuple[Text, Callable[[], list[RenderableType]], str | None]:
-    """The verdict, the report and, where data are wanted, the metric file."""
+) -> tuple[Page, Rows, str | None]:
+    """The page, what was written and comes next and, where data are wanted, the metric file."""
     from tubecert.records import to_json
     from tubecert.report import synthesis
 
     data, file = found.search(), found.file
-    return (
-        synthesis.verdict_line(data, file, system.name),
-        lambda: synthesis.report(data, file, system, target),
-        certificate.dump(to_json(data if file is None else file))
-        if output.json or target == certificate.STDOUT
-        else None,
-    )
+    certify = shlex.join(["tubecert", "certify", system.path, "--metric", target])
+    if system.lacks:
+        certify = f"to certify with it, add {' and '.join(system.lacks)} to {visible(system.path)}"
+    closing = [] if file is None else [("metric file", target), ("next", certify)]
+    page = synthesis.page_of(data, file, system.name, system.states)
+    wanted = output.json or target == certificate.STDOUT
+    return page, closing, certificate.dump(to_json(data if file is None else file)) if wanted else None

@@ -17,6 +17,7 @@ from tubecert.cli.targets import refused, spare
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Location
 from tubecert.library.asked import at_rate, verification_numbers
+from tubecert.printable import visible
 from tubecert.progress import Phase
 from tubecert.report.terminal import Terminal
 
@@ -61,7 +62,7 @@ def run(given: Given, output: Output) -> ExitCode:
         spare(target, {"input": cases[0].file, "specification": cases[0].spec.path})
     from tubecert.enclosure.branch_and_bound import Effort
     from tubecert.pipeline.verification import verify
-    from tubecert.report import progress, verification
+    from tubecert.report import progress, text, verification
 
     effort = Effort(gap=float(numbers.gap), budget=numbers.budget)
     terminal = Terminal.stderr(color=output.color)
@@ -77,17 +78,29 @@ def run(given: Given, output: Output) -> ExitCode:
             verified = verify(case.spec, effort, told)
         found.append((case.file, verified))
         if not output.json:  # one after the other: many metrics take their time
-            one = [verification.line(case.file, verified)]
-            write_stdout(shown.text(one if output.quiet else verification.report(case.file, verified)))
+            page = verification.page_of(case.file, verified)
+            write_stdout(
+                shown.text([text.headline(page)] if output.quiet else text.screen(page, [], verbose=True))
+            )
     if target is not None and found[0][1].file is not None:
         certificate.write(target, found[0][1].file.to_json())
     if output.json:
         write_stdout(verification.as_json(found))
-    elif not output.quiet and (said := verification.summary(found, target)):
-        write_stdout(shown.text(said))
+    elif not output.quiet:
+        write_stdout(_closing([verified for _, verified in found], target))
     if given.expect:
         return _as_locked([case.spec for case in cases], [verified for _, verified in found], terminal)
     return _code([verified for _, verified in found])
+
+
+def _closing(found: Sequence[Verified], target: str | None) -> str:
+    """How many there are of each verdict, and where a metric was written."""
+    verdicts = [verified.verdict for verified in found]
+    counts = ", ".join(f"{verdicts.count(each)} {each}" for each in dict.fromkeys(verdicts))
+    written = target is not None and found[0].file is not None
+    return (f"\n{len(found)} metrics: {counts}\n" if len(found) > 1 else "") + (
+        f"  metric file {visible(target or '')}\n" if written else ""
+    )
 
 
 def _as_locked(specs: Sequence[Spec], found: Sequence[Verified], terminal: Terminal) -> ExitCode:

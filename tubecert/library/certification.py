@@ -83,7 +83,7 @@ class Certification(Stated[Certificate]):
     @property
     def reasons(self) -> tuple[Reason, ...]:
         """Why the verdict is what it is, in words: `claim`, `message`, `at` and `relax` (what would help)."""
-        from tubecert.report.certificate_page import reasons
+        from tubecert.report.certificate_brief import reasons
 
         return reasons(self.result)
 

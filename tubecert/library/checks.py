@@ -29,7 +29,7 @@ class Checked:
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.findings(self.name, self.findings)
+        return notebook.of_page(words.page_of(self.name, self.findings))
 
 
 def check(source: Specifiable, *, settings: Data | None = None) -> Checked:

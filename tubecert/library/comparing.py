@@ -22,7 +22,7 @@ from tubecert.library.specification import File
 from tubecert.printable import printable_json
 from tubecert.report import html, markdown
 from tubecert.report.comparison import Comparison as Sides
-from tubecert.report.comparison import page_of_comparison
+from tubecert.report.comparison import page_of
 from tubecert.report.quantities import Value
 
 REMEDY: Final = "give a file FILE.html, FILE.md, FILE.csv or FILE.json in a folder that exists"
@@ -67,12 +67,12 @@ class Comparison:
     @property
     def html(self) -> str:
         """As a page with figures."""
-        return html.render_page(page_of_comparison(self.sides))
+        return html.render_page(page_of(self.sides))
 
     @property
     def markdown(self) -> str:
         """As Markdown, for a pull request."""
-        return markdown.render_page(page_of_comparison(self.sides, all_of_it=False))
+        return markdown.render_page(page_of(self.sides))
 
     def save(self, path: File) -> None:
         """Write a page or a table, by the ending of the name: .html, .md, .csv or .json. Raises `TargetError`."""
@@ -80,13 +80,13 @@ class Comparison:
         certificate.write_text(target, FORMATS[ending_of(target)](self), REMEDY)
 
     def __str__(self) -> str:
-        page = page_of_comparison(self.sides, all_of_it=False)
+        page = page_of(self.sides)
         return f"{page.name}: {page.summary}"
 
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.of_page(page_of_comparison(self.sides, all_of_it=False))
+        return notebook.of_page(page_of(self.sides))
 
 
 FORMATS: Final[Mapping[str, Callable[[Comparison], str]]] = {

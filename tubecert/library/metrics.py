@@ -40,6 +40,7 @@ from tubecert.words.claims import sentence
 if TYPE_CHECKING:
     from tubecert.pipeline.synthesised import Synthesised
     from tubecert.pipeline.verification import Verified
+    from tubecert.report.page import Page
 
 IN_CODE: Final = "given in code"  # what a certificate calls a metric that is no file
 
@@ -112,9 +113,9 @@ class SynthesisedMetric(_Held):
         return _sentence(self.found.reason)
 
     def __str__(self) -> str:
-        from tubecert.report import synthesis
+        from tubecert.report.text import headline
 
-        return synthesis.verdict_line(self.found.search(), self.file, self.given.name).plain
+        return headline(self._page()).plain
 
     def __repr__(self) -> str:
         return f"<SynthesisedMetric: {self}>"
@@ -122,7 +123,12 @@ class SynthesisedMetric(_Held):
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.of_line(str(self), self.given.name, self.verdict, _rows(self.dual_metric))
+        return notebook.of_page(self._page())
+
+    def _page(self) -> Page:
+        from tubecert.report.synthesis import page_of
+
+        return page_of(self.found.search(), self.file, self.given.name, self.given.states)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,9 +169,9 @@ class VerifiedMetric(_Held):
         return _sentence(self.found.reason)
 
     def __str__(self) -> str:
-        from tubecert.report import verification
+        from tubecert.report.text import headline
 
-        return verification.line(self.name, self.found).plain
+        return headline(self._page()).plain
 
     def __repr__(self) -> str:
         return f"<VerifiedMetric: {self}>"
@@ -173,7 +179,12 @@ class VerifiedMetric(_Held):
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        return notebook.of_line(str(self), self.name, self.verdict)
+        return notebook.of_page(self._page())
+
+    def _page(self) -> Page:
+        from tubecert.report.verification import page_of
+
+        return page_of(self.name, self.found)
 
 
 MetricLike: TypeAlias = File | SynthesisedMetric | VerifiedMetric | Data
@@ -293,8 +304,3 @@ def options_of(system: Spec, numbers: SynthesisNumbers) -> pipeline.Options:
 
 def _sentence(reason: Reason | None) -> str:
     return "" if reason is None else sentence(reason)
-
-
-def _rows(matrix: tuple[tuple[str, ...], ...] | None) -> list[tuple[str, str]]:
-    """W, a row for each row."""
-    return [(f"W[{i + 1}]", ",  ".join(row)) for i, row in enumerate(matrix or ())]

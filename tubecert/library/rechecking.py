@@ -15,13 +15,12 @@ from tubecert.recheck import document
 from tubecert.recheck.run import BUDGET, Examined, Recheck, Report
 from tubecert.recheck.run import recheck as examined
 from tubecert.report.progress import timed
+from tubecert.report.rechecked import page_of
 
 if TYPE_CHECKING:  # of the producer, which takes longer to import than many certificates to examine
     from tubecert.library.plain import Number
     from tubecert.library.specification import File
     from tubecert.library.stated import Stated
-
-WORDS = {"confirmed": "confirmed", "contradicted": "NOT CONFIRMED", "undecided": "undecided"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,17 +51,14 @@ class Rechecked:
         return self.found.failing
 
     def __str__(self) -> str:
-        return verdict_line(self.found, self.name)
+        from tubecert.report.text import headline
+
+        return headline(page_of(self.found, self.name)).plain
 
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        failing = self.first_failing
-        details = (
-            [] if failing is None else [("first failing claim", f"{failing.name}: {failing.outcome.why}")]
-        )
-        details.append(("claims", str(len(self.claims))))
-        return notebook.of_line(str(self), self.name, self.verdict, details)
+        return notebook.of_page(page_of(self.found, self.name))
 
 
 def recheck(
@@ -121,11 +117,6 @@ def text_of(name: str) -> str:
         return data.decode()
     except UnicodeDecodeError:
         raise unreadable(name, "it is not UTF-8") from None
-
-
-def verdict_line(found: Recheck, name: str) -> str:
-    """The verdict, and what the certificate says."""
-    return f"{WORDS[found.verdict]} {name}: the certificate says {found.stated}"
 
 
 def told(progress: Progress) -> Report:

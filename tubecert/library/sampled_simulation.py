@@ -6,7 +6,6 @@ import os
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tubecert.digits import short
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 from tubecert.library.sampled import SampledCertification
@@ -17,6 +16,7 @@ from tubecert.sampled_loop.record import Certificate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from tubecert.report.page import Page
     from tubecert.simulation.sampled.campaign import Campaign
     from tubecert.simulation.sampled.loop import Controllers, Step
 
@@ -73,9 +73,9 @@ class SampledSimulation:
             return written_to(os.fspath(folder), self.summary, files(self.campaign), figures)
 
     def __str__(self) -> str:
-        from tubecert.report.sampled_simulation import verdict_line
+        from tubecert.report.text import headline
 
-        return verdict_line(self.campaign).plain
+        return headline(self._page()).plain
 
     def __repr__(self) -> str:
         return f"<SampledSimulation: {self}>"
@@ -83,12 +83,12 @@ class SampledSimulation:
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        shares = self.campaign.arrays["share"].max(axis=1)
-        own, style = self.campaign.setting, "falsified" if self.falsified else ""
-        rows = [
-            (name, f"largest share {short(share)}") for name, share in zip(own.names, shares, strict=True)
-        ]
-        return notebook.of_line(str(self), own.spec.name, style, rows)
+        return notebook.of_page(self._page())
+
+    def _page(self) -> Page:
+        from tubecert.report.sampled_simulation import page_of
+
+        return page_of(self.campaign)
 
 
 def require_tube(found: SampledCertification) -> None:

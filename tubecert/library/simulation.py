@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tubecert.digits import short
 from tubecert.enclosure.interval import Array
 from tubecert.library.specification import File
 from tubecert.records import Json
@@ -16,6 +15,7 @@ from tubecert.records import Json
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from tubecert.report.page import Page
     from tubecert.simulation.adaptive.campaign import Campaign
     from tubecert.simulation.adaptive.loops import Runs
     from tubecert.simulation.adaptive.record import Outcome, Summary
@@ -98,9 +98,9 @@ class Simulation:
             return write(os.fspath(folder), self.campaign, certificate=self.compared_with)
 
     def __str__(self) -> str:
-        from tubecert.report import simulation
+        from tubecert.report.text import headline
 
-        return simulation.verdict_line(self._found()).plain
+        return headline(self._page()).plain
 
     def __repr__(self) -> str:
         return f"<Simulation: {self}>"
@@ -108,10 +108,9 @@ class Simulation:
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
 
-        style = "falsified" if self.falsified else ""
-        reach, attacks = self.campaign.setting.reach, self.campaign.attacks
-        rows = [
-            (item.loop.controller, f"largest d/dbar {short(item.greatest and item.greatest / reach)}")
-            for item in attacks
-        ]
-        return notebook.of_line(str(self), self.campaign.setting.spec.name, style, rows)
+        return notebook.of_page(self._page())
+
+    def _page(self) -> Page:
+        from tubecert.report.simulation import page_of
+
+        return page_of(self._found())

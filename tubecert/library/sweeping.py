@@ -130,13 +130,13 @@ class Swept:
         return self.table.csv()
 
     def __str__(self) -> str:
-        return told.summary(self.table).plain
+        page = told.page_of(self.table)
+        return f"{page.name}: {page.summary}"
 
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
-        from tubecert.report.sweep_page import page_of_sweep
 
-        return notebook.of_page(page_of_sweep(self.table))
+        return notebook.of_page(told.page_of(self.table))
 
 
 def sweep(
@@ -226,18 +226,15 @@ def _range_text(values: Range, key: str) -> str:
 def _written(folder: Path, table: SweepTable, *, parquet: bool) -> tuple[str, ...]:
     """Write table, page and figures; their names. Raises `TargetError`."""
     from tubecert.report.figures_file import svg_file
-    from tubecert.report.figures_sweep import sweep_figures
+    from tubecert.report.figures_sweep import sweep_figures, with_figures
     from tubecert.report.html import render_page
-    from tubecert.report.sweep_page import page_of_sweep
 
     texts = {"table.csv": table.csv()}
     if parquet:
         replace(folder / "table.parquet", table.parquet())
-    texts |= {"sweep.html": render_page(page_of_sweep(table))}
-    texts |= {
-        f"figures/{figure.key.removeprefix('sweep-')}.svg": svg_file(figure)
-        for figure in sweep_figures(table)
-    }
+    drawn = sweep_figures(table)
+    texts |= {"sweep.html": render_page(with_figures(told.page_of(table), drawn))}
+    texts |= {f"figures/{figure.key.removeprefix('sweep-')}.svg": svg_file(figure) for figure in drawn}
     for name, text in texts.items():
         certificate.write_text(str(folder / name), text, REMEDY)
     return (*texts, *(["table.parquet"] if parquet else []))

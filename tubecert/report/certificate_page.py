@@ -6,24 +6,20 @@ rounded up, bounds from below down.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Iterator, Mapping
 from itertools import islice
 
 from tubecert.bounds.meanings import EVERY, meaning
 from tubecert.certificate.follows import InputData
 from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
-from tubecert.claims import family as claims
-from tubecert.claims.gains import GainsSuffice
 from tubecert.claims.limits import InputWithinLimits
-from tubecert.digits import UNKNOWN, down, end, exact, short, up
-from tubecert.kinds import ALONE, DISTANCE, RATES
-from tubecert.kinds.alone import AloneData
+from tubecert.digits import UNKNOWN, down, exact, short, up
 from tubecert.records import to_json
 from tubecert.report import claimed, reach
+from tubecert.report.certificate_brief import first_blocks, reasons
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_time import input_figures, state_figures
-from tubecert.report.figures_tube import places, suprema_figures, tube_figures
+from tubecert.report.figures_tube import tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.mathml import matrix, named
 from tubecert.report.outline import tube_outline, widths
@@ -35,7 +31,6 @@ from tubecert.report.page import (
     Items,
     Listing,
     Page,
-    Reason,
     Section,
     Table,
     Tile,
@@ -47,11 +42,8 @@ from tubecert.report.page_simulation import Simulated, simulated_blocks
 from tubecert.report.page_trust import declared, proven
 from tubecert.report.shares import filled
 from tubecert.verdict import Verdict
-from tubecert.words.advice import advice
 from tubecert.words.assumptions import assumed
-from tubecert.words.claims import message, sentence, title
-from tubecert.words.conditions import SAYS, equation
-from tubecert.words.sampled_loop import family
+from tubecert.words.claims import sentence
 
 _ELLIPSE = (
     "The tube in each plane: the projection of the states whose Riemannian distance to the plan stays below the proven "
@@ -66,7 +58,15 @@ _SHARES = (
     "makes the tube wide; a better plan or model helps there. What is missing to 100 % is the margin. The gains of "
     "each certificate were chosen by themselves, so columns need not agree."
 )
+_ROWS = (
+    "Each row stands on its own: do not take ω from one row and Γ from another. The row marked * decides the verdict. "
+    "Gains that are certified are the least that were proven, so a margin of next to nothing is no sign of danger."
+)
 _NOTES = "Advice, curves of gains, where constants are largest and points to draw the plan by"
+_INPUTS = (
+    "Proven for every uncertainty of the class: what the plan needs, and what feedback and adaptation add at most. "
+    "Used: 0 % in the middle of the limits, 100 % at one of them. The verdict is about the loops that decide."
+)
 _NO_LIMITS = (
     "The specification gives no limits of the inputs, so nothing is claimed of them; figures show the plan's."
 )
@@ -153,9 +153,7 @@ def _sizes(result: Result) -> Iterator[Tile]:
 
 def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator[Section]:
     result = certificate.result
-    brief = Facts(facts=tuple((name, Cell(text=told)) for name, told in _brief(result)))
-    beside = [reason for reason in result.failed if reason is not result.reason]
-    yield Section(key="brief", title="In brief", blocks=(brief, *reasons(result, beside)))
+    yield Section(key="brief", title="In brief", blocks=first_blocks(result))
     if result.sections:
         yield Section(key="gains", title="Gains", blocks=tuple(_gains(result)))
     if blocks := tuple(_filled(result)):
@@ -183,152 +181,15 @@ def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator
     yield Section(key="check", title="Check it again", blocks=tuple(again))
 
 
-def reasons(result: Result, some: Sequence[claims.Reason] | None = None) -> tuple[Reason, ...]:
-    """Why the verdict is what it is, in words; or what only `some` of the reasons say."""
-    return tuple(
-        Reason(
-            verdict=reason.verdict,
-            claim=title(reason.claim),
-            message=message(reason),
-            at="" if reason.at is None else claimed.point(result, reason.at),
-            relax=advice(reason.relax, result.spec.effective.uncertainty.h),
-        )
-        for reason in (result.reasons if some is None else some)
-    )
-
-
-# -- in brief
-
-
-def _brief(result: Result) -> Iterator[tuple[str, str]]:
-    """What is seen first, a line each where there is room."""
-    if result.reason is not None and result.reason.verdict is not Verdict.CERTIFIED:
-        [why] = reasons(result, [result.reason])  # what it says stands in the first line
-        yield from ((name, told) for name, told in (("at", why.at), ("help", why.relax)) if told)
-    if result.claim.plans is not None:
-        yield "plans", family(result.spec.effective)
-    yield "start", claimed.start_words(result)
-    if result.tube is not None:
-        yield from _brief_tube(result, result.tube)
-    for row in deciding(result):
-        how = "" if row.verdict is Verdict.CERTIFIED else f"{row.verdict} "
-        yield "gains", f"{row.text()}, {how}by certificate {NAMES[row.section]}"
-    yield from less_by_distance(result)
-    yield from beyond_its_theorem(result)
-    if result.verdict is Verdict.CERTIFIED:  # else it says above what would help
-        yield from (row for reason in result.reasons for row in _limits(reason))
-    for own in result.inputs:
-        yield from ((f"input {own.input}", told) for told in reach.input_lines(result, own))
-    yield from (("clearance", told) for told in reach.clearances(result))
-    yield from without_adaptation(result)
-    if result.declared:
-        yield (
-            "declared",
-            f"{', '.join(f'{k} <= {exact(v)}' for k, v in result.declared.items())}: believed as given",
-        )
-    every = len(result.assumptions)
-    yield (
-        "assumed",
-        f"exact continuous-time control, full state, no noise, delay or saturation; {every} in all",
-    )
-
-
-def _brief_tube(result: Result, tube: TubeData) -> Iterator[tuple[str, str]]:
-    radii = f"rho = {reach.radii(tube)}"
-    if tube.half_widths is None:
-        yield "tube", radii
-    else:
-        known = reach.half_widths(result, tube.half_widths, sign="+-")
-        yield "tube", f"{known}; {radii}" if tube.coordinates is None else known
-        yield from (("wish", told) for told in reach.asked_for(result, tube.half_widths))
-    own = result.spec.effective.tube.rho_a
-    asked = own if result.overrides.rho_a is None else result.overrides.rho_a
-    if asked is not None and tube.rho_r is not None and tube.rho_a < asked:
-        name = "tube.rho_a" if result.overrides.rho_a is None else "--rho-a"
-        yield (
-            "rho_a",
-            f"{name} {short(asked)} is more than the start leaves of this tube: half of that is taken",
-        )
-    yield from (("plan", told) for told in reach.excursion(result))
-    chosen = [NAMES[key] for key in result.decided_by]
-    yield from (("long run", rest) for words, rest in reach.long_run(result) if words in chosen)
-
-
-def _limits(reason: claims.Reason) -> Iterator[tuple[str, str]]:
-    """What sets certified gains, and what would lower them most."""
-    if isinstance(reason.claim, GainsSuffice) and reason.claim.binds is not None:
-        yield "limit", f"{equation(reason.claim.binds)} sets the bandwidth"
-    if reason.relax:
-        yield "help", advice(reason.relax[:1])
-
-
-def less_by_distance(result: Result) -> Iterator[tuple[str, str]]:
-    """That A decides unasked, though B is certified with smaller gains: which, and the key."""
-    if result.spec.effective.says_what_decides or result.decided_by != (RATES.key,):
-        return
-    found = [
-        row for row in rows(result) if row.pair.adaptation_rate is not None and row.pair.bandwidth is not None
-    ]
-    own = [row for row in found if row.decides]
-    others = [row for row in found if row.section == DISTANCE.key and row.verdict is Verdict.CERTIFIED]
-    if not own or not others:
-        return
-    best = min(others, key=_adaptation)
-    if 2 * _adaptation(best) <= _adaptation(own[0]) or own[0].verdict is not Verdict.CERTIFIED:
-        yield (
-            "or",
-            f"{best.text()}, by {NAMES[best.section]}: --conditions B",
-        )
-
-
-def _adaptation(row: Gains) -> Fraction:
-    return row.pair.adaptation_rate or Fraction(0)
-
-
-def beyond_its_theorem(result: Result) -> Iterator[tuple[str, str]]:
-    """Why certificate A is undecided though it has gains; where it decides, and so is told why, what to do."""
-    section = result.sections.get(RATES.key)
-    acts = result.claim.wind is not None or result.claim.parameters is not None
-    if not acts or section is None or section.verdict != Verdict.UNDECIDED:
-        return
-    if RATES.key not in result.decided_by:
-        yield "undecided", f"certificate {NAMES[RATES.key]}: {SAYS['wind_not_covered']}"
-    elif not list(less_by_distance(result)):
-        yield "help", f"{NAMES[DISTANCE.key]} is stated for them as well: --conditions B"
-
-
-def without_adaptation(result: Result) -> Iterator[tuple[str, str]]:
-    """What adaptation is for: how much uncertainty the feedback alone can take in this tube."""
-    section, h = result.sections.get(ALONE.key), result.constants.get("h")
-    if not isinstance(section, AloneData) or h is None or h.above is None:
-        return
-    limit = (
-        "no |h|" if section.uncertainty_limit is None else f"every |h| < {down(section.uncertainty_limit)}"
-    )
-    known: Mapping[str, object] = result.spec.effective.part("system").get("parameters", {})
-    ranges = any(not isinstance(value, str) for value in known.values())
-    joined = result.spec.effective.part("disturbance") or ranges
-    whole = "|h| with what wind and parameters add to it" if joined else "|h|"
-    end = ": this tube needs no adaptation" if section.verdict is Verdict.CERTIFIED else ""
-    yield "alone", f"feedback alone can take {limit}; there is {whole} <= {up(h.above)}{end}"
-
-
 # -- section by section
 
 
 def gains_table(result: Result) -> Table | None:
     """Every set of gains, a row each; None if there is none."""
     found = list(rows(result))
-    if not found:
-        return None
-    columns = ("certificate", "gains", "verdict", "ω (rad/s)", "Γ", "margin left")
-    note = (
-        "Each row stands on its own: do not take ω from one row and Γ from another. The row marked * "
-        "decides the verdict. Gains that are certified are the least that were proven, so a margin of next to nothing "
-        "is no sign of danger."
-    )
-    decided = any(row.decides for row in found)
-    return Table(columns=columns, rows=tuple(map(_gains_row, found)), note=note if decided else "")
+    columns = ("certificate", "gains", "!verdict", ">ω (rad/s)", ">Γ", ">margin left")
+    note = _ROWS if any(row.decides for row in found) else ""
+    return Table.of(columns, map(_gains_row, found), note) if found else None
 
 
 def _gains(result: Result) -> Iterator[Block]:
@@ -344,17 +205,9 @@ def _gains(result: Result) -> Iterator[Block]:
         yield Figures(figures=curves)
 
 
-def _gains_row(row: Gains) -> tuple[Cell, ...]:
-    return (
-        Cell(text=NAMES[row.section]),
-        Cell(text=f"{row.which} *" if row.decides else row.which),
-        Cell(text=row.verdict, kind="verdict"),
-        *(
-            Cell(text="" if gain is None else exact(gain), kind="number")
-            for gain in (row.pair.bandwidth, row.pair.adaptation_rate)
-        ),
-        Cell(text=row.slack, kind="number"),
-    )
+def _gains_row(row: Gains) -> tuple[str, ...]:
+    gains = ("" if gain is None else exact(gain) for gain in (row.pair.bandwidth, row.pair.adaptation_rate))
+    return NAMES[row.section], f"{row.which} *" if row.decides else row.which, row.verdict, *gains, row.slack
 
 
 def _filled(result: Result) -> Iterator[Block]:
@@ -378,7 +231,7 @@ def _share(share: float | None) -> Cell:
 
 def _tube(result: Result) -> Iterator[Block]:
     if result.tube is not None:
-        yield Facts(facts=tuple(_radii(result, result.tube)))
+        yield Facts.of(_radii(result, result.tube))
     figures = tuple(tube_figures(result))
     if figures:
         yield Figures(figures=figures)
@@ -394,25 +247,18 @@ def _drawn(result: Result) -> Iterator[Block]:
         yield Words(text=_ELLIPSE if outline.sides is None else _CUT)
 
 
-def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, Cell]]:
-    yield "radius rho", Cell(text=reach.radii(tube))
-    yield "epsilon", Cell(text=short(tube.epsilon))
+def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, str]]:
+    """What the first section does not say of it."""
+    yield "radius rho", reach.radii(tube)
+    yield "epsilon", short(tube.epsilon)
     if tube.coordinates is not None:
         yield (
             "measured by",
-            Cell(text="z = S x, in which rho, rho_a and epsilon are lengths, whatever the units of states"),
+            "z = S x, in which rho, rho_a and epsilon are lengths, whatever the units of states",
         )
-        yield "epsilon, by state", Cell(text=reach.in_states(result, tube, tube.epsilon, "epsilon"))
-    known = widths(result)
-    if known:
-        yield "half-widths", Cell(text=reach.half_widths(result, known))
-        yield from (("asked for", Cell(text=told)) for told in reach.asked_for(result, known))
-    for line in reach.clearances(result):
-        yield "obstacles", Cell(text=line)
-    yield "claimed", Cell(text=claimed.span(result))
-    yield "starts", Cell(text=claimed.start_words(result))
+        yield "epsilon, by state", reach.in_states(result, tube, tube.epsilon, "epsilon")
     for words, rest in reach.long_run(result):
-        yield f"in the long run, {words}", Cell(text=rest)
+        yield f"in the long run, {words}", rest
 
 
 def _inputs(result: Result) -> Iterator[Block]:
@@ -425,15 +271,12 @@ def _inputs(result: Result) -> Iterator[Block]:
 
 
 def _input_table(result: Result) -> Table:
-    loops = [(own, key) for own in result.inputs for key in _loops(own)]
-    columns = ("input", "limits", "verdict", "on the plan", "loop of", "stays within", "used")
-    return Table(
-        columns=(*columns, "feedback", "adaptation"),
-        rows=tuple(_input_row(result, own, key) for own, key in loops),
-        note="Proven for every uncertainty of the class: what the plan needs, and what feedback and adaptation add at "
-        "most. Used: 0 % in the middle of the limits, 100 % at one of them. The verdict is about the loops that "
-        "decide.",
-    )
+    columns = (
+        "input", "limits", "!verdict", ">on the plan", "loop of", ">stays within", ">used", ">feedback adds",
+        ">adaptation adds",
+    )  # fmt: skip
+    rows = (_input_row(result, own, key) for own in result.inputs for key in _loops(own))
+    return Table.of(columns, rows, _INPUTS)
 
 
 def _loops(own: InputData) -> list[str | None]:
@@ -442,26 +285,15 @@ def _loops(own: InputData) -> list[str | None]:
     return found or [None]
 
 
-def _input_row(result: Result, own: InputData, key: str | None) -> tuple[Cell, ...]:
+def _input_row(result: Result, own: InputData, key: str | None) -> tuple[str, ...]:
     unit = result.spec.effective.system.units.get(own.input, "")
-    bound = None if key is None else own.bounds[key]
-    return (
-        Cell(text=f"{own.input} ({unit})" if unit else own.input),
-        Cell(text=f"[{end(own.limits[0])}, {end(own.limits[1])}]", kind="number"),
-        Cell(text=own.verdict, kind="verdict"),
-        Cell(text=reach.span_of(own.plan.least.below, own.plan.greatest.above), kind="number"),
-        *(
-            (
-                Cell(text=NAMES[key]),
-                Cell(text=reach.span_of(bound.least, bound.greatest), kind="number"),
-                Cell(text=reach.used(own, key), kind="number"),
-                Cell(text=up(bound.feedback), kind="number"),
-                Cell(text=up(bound.adaptation), kind="number"),
-            )
-            if bound is not None and key is not None
-            else (Cell(text=UNKNOWN),) * 5
-        ),
-    )
+    name, limits = f"{own.input} ({unit})" if unit else own.input, reach.ends_of(own.limits)
+    first = (name, limits, own.verdict, reach.span_of(own.plan.least.below, own.plan.greatest.above))
+    if key is None:
+        return (*first, *(UNKNOWN,) * 5)
+    bound = own.bounds[key]
+    span, added = reach.span_of(bound.least, bound.greatest), (up(bound.feedback), up(bound.adaptation))
+    return (*first, NAMES[key], span, reach.used(own, key), *added)
 
 
 def _rests_on(result: Result) -> Iterator[Block]:
@@ -471,14 +303,10 @@ def _rests_on(result: Result) -> Iterator[Block]:
 
 
 def _metric(metric: MetricData, tube: TubeData | None) -> Iterator[Block]:
-    facts = [
-        ("verdict", Cell(text=metric.verdict, kind="verdict")),
-        ("rate", Cell(text=f"{exact(metric.rate)} 1/s")),
-    ]
+    facts = [("verdict", str(metric.verdict)), ("rate", f"{exact(metric.rate)} 1/s")]
     if metric.largest_rate is not None:
-        facts.append(("supports rates up to", Cell(text=f"{down(metric.largest_rate.below, 7)} 1/s")))
-    facts += [(words, Cell(text=bounds)) for words, bounds in _metric_bounds(metric, tube)]
-    yield Facts(facts=tuple(facts))
+        facts.append(("supports rates up to", f"{down(metric.largest_rate.below, 7)} 1/s"))
+    yield Facts.of([*facts, *_metric_bounds(metric, tube)])
     yield Listing(text=_entries(metric), math=named("W", matrix(metric.dual_metric)))
     yield Words(text="W is the dual metric, the inverse of M; it is symmetric.")
 
@@ -486,14 +314,9 @@ def _metric(metric: MetricData, tube: TubeData | None) -> Iterator[Block]:
 def _metric_bounds(metric: MetricData, tube: TubeData | None) -> Iterator[tuple[str, str]]:
     """Where the metric is bounded, and by what; over a tube with coordinates, by S'S."""
     plain = tube is None or tube.coordinates is None
-    unit = "I" if plain else "S'S"
+    over, unit = ("over the tube", "I") if plain else ("over the tube (z = S x: its coordinates)", "S'S")
     for words, a, A, of in (
-        (
-            "over the tube" if plain else "over the tube (z = S x: its coordinates)",
-            metric.lower,
-            metric.upper,
-            unit,
-        ),
+        (over, metric.lower, metric.upper, unit),
         ("on the safe set", metric.lower_on_set, metric.upper_on_set, "I"),
     ):
         if a is not None and A is not None:
@@ -510,13 +333,6 @@ def _entries(metric: MetricData) -> str:
 
 
 def _constants(result: Result) -> Iterator[Block]:
-    figures = tuple(suprema_figures(result))
-    if figures:
-        yield Words(
-            text="Where in the tube, with all of its radius, each constant was found largest or smallest "
-            "(computed, not examined by recheck):"
-        )
-        yield Figures(figures=figures, places=places(result))
     yield Table(
         columns=("symbol", "meaning", "proven", "unit", "equation", "gap"),
         rows=tuple(_constant(result, name, result.constants[name]) for name in _order(result.constants)),

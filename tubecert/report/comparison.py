@@ -12,17 +12,20 @@ from dataclasses import dataclass
 from fractions import Fraction
 from io import StringIO
 from itertools import groupby
+from math import isfinite
 from pathlib import PurePath
 from typing import Final
 
 from tubecert.certificate.effective import Tree
 from tubecert.digits import UNKNOWN, down, exact, percent, up
 from tubecert.records import exact_json
-from tubecert.report.claimed import NOT_RECHECKED
-from tubecert.report.figures_comparison import comparison_figures
-from tubecert.report.page import Block, Cell, Figures, Page, Section, Table
+from tubecert.report.claimed import NOT_RECHECKED, size
+from tubecert.report.gains import gains_text
+from tubecert.report.page import Cell, Facts, Page, Section, Table
 from tubecert.report.quantities import AnyCertificate, AnyResult, Quantity, Value, failed, merged, quantities
+from tubecert.sampled_loop.record import Result as SampledResult
 from tubecert.words.conditions import SECTIONS
+from tubecert.words.sampled_loop import NOTHING
 
 MISSING: Final = "not there"
 _MOST = 60  # differences shown on a page
@@ -108,8 +111,8 @@ class Comparison:
 # -- as a page
 
 
-def page_of_comparison(comparison: Comparison, *, all_of_it: bool = True) -> Page:
-    """The page: verdicts and tubes, each kind, what differs; with margins and further numbers if `all_of_it`."""
+def page_of(comparison: Comparison) -> Page:
+    """The page: verdicts, tubes and gains at a glance, every number of each kind, what differs."""
     specifications = {side.result.spec.effective.name for side in comparison.sides}
     count = len(comparison.differences)
     differ = f", {count} key{'s' * (count > 1)} of their specifications differ" if count else ""
@@ -118,57 +121,65 @@ def page_of_comparison(comparison: Comparison, *, all_of_it: bool = True) -> Pag
         verdict="",
         summary=f"{len(comparison.sides)} certificates{differ or ' of the same specification'}",
         meaning=NOT_RECHECKED,
-        tiles=(),
-        sections=tuple(_sections(comparison, all_of_it=all_of_it)),
+        sections=tuple(_sections(comparison)),
         about="comparison",
     )
 
 
-def _sections(comparison: Comparison, *, all_of_it: bool) -> Iterator[Section]:
-    figures = comparison_figures(
-        comparison.names, [side.found for side in comparison.sides], comparison.quantities
-    )
-    if figures and all_of_it:
-        yield Section(key="figures", title="Figures", blocks=(Figures(figures=tuple(figures)),))
-    verdicts = [
-        _row(
-            "verdict", [Cell(text=str(side.result.verdict), kind="verdict") for side in comparison.sides], ""
-        )
-    ]
-    if any(failed(side.result) for side in comparison.sides):
-        verdicts.append(_row("not proven", [Cell(text=failed(side.result)) for side in comparison.sides], ""))
-    for section, members in groupby(comparison.quantities, key=lambda each: each.section):
-        rows = [_quantity(comparison, each) for each in members if all_of_it or _matters(each)]
-        title = SECTIONS.get(section, section) or "Verdict and tube"
-        rows = rows if section else [*verdicts, *rows]
-        yield Section(key=section or "tube", title=title, blocks=(_table(comparison, "", rows),))
-        verdicts = [] if not section else verdicts
-    yield Section(
-        key="differences", title="What differs in the specification", blocks=tuple(_differing(comparison))
+def _sections(comparison: Comparison) -> Iterator[Section]:
+    by_kind = {key: tuple(own) for key, own in groupby(comparison.quantities, key=lambda each: each.section)}
+    plain = by_kind.pop("", ())
+    glance = [each for each in plain if _at_a_glance(each)]
+    rows = [*_verdicts(comparison), *(_quantity(comparison, each) for each in glance)]
+    rows += (_kind(comparison, key) for key in by_kind)
+    keys = Facts.of([("differ", ", ".join(comparison.differences))], ("differ",))
+    differ = (keys,) if comparison.differences else ()
+    yield Section(key="glance", title="At a glance", blocks=(_table(comparison, rows), *differ))
+    for key, own in (("tube", [each for each in plain if each not in glance]), *by_kind.items()):
+        rows = [_quantity(comparison, each) for each in own]
+        if rows:
+            title = SECTIONS.get(key, "Further numbers of the tube")
+            yield Section(key=key, title=title, blocks=(_table(comparison, rows),))
+    differing = _differing(comparison)
+    yield Section(key="differences", title="What differs in the specification", blocks=(differing,))
+
+
+def _at_a_glance(quantity: Quantity) -> bool:
+    return quantity.name == "rho" or quantity.name.startswith(
+        ("half_width", "clearance", "least", "greatest")
     )
 
 
-def _matters(quantity: Quantity) -> bool:
-    """Whether it is shown at a glance."""
-    return (
-        bool(quantity.role and not quantity.share)
-        or quantity.name == "verdict"
-        or quantity.name.endswith("radius")
-        or not quantity.section
-    )
+def _verdicts(comparison: Comparison) -> Iterator[tuple[Cell, ...]]:
+    found = [side.result for side in comparison.sides]
+    yield _row("verdict", [Cell(text=str(own.verdict), kind="verdict") for own in found])
+    if any(map(failed, found)):
+        yield _row("not proven", [Cell(text=failed(own)) for own in found])
+
+
+def _kind(comparison: Comparison, key: str) -> tuple[Cell, ...]:
+    """What each says of a kind, on a line: its verdict, and the gains that it is about."""
+    told = []
+    for side in comparison.sides:
+        result = side.result
+        if isinstance(result, SampledResult) or key not in result.sections:
+            told.append(MISSING)
+            continue
+        section = result.sections[key]
+        pair = section.decisive(asked=result.asked)
+        gains = "" if pair is None or pair.bandwidth is None else f": {gains_text(pair)}"
+        told.append(f"{section.verdict}{gains}")
+    return _row(SECTIONS[key], [Cell(text=text) for text in told])
 
 
 def _quantity(comparison: Comparison, quantity: Quantity) -> tuple[Cell, ...]:
-    cells = []
-    for side in comparison.sides:
-        value = side.value(quantity.key)
-        if quantity.name == "verdict":
-            text = MISSING if value is None else str(value)
-            cells.append(Cell(text=text, kind="text" if value is None else "verdict"))
-        else:
-            cells.append(Cell(text=_told(quantity, value), kind="number"))
+    values = [side.value(quantity.key) for side in comparison.sides]
+    if quantity.name == "verdict":
+        cells = [Cell(text=str(value or MISSING), kind="verdict" if value else "text") for value in values]
+    else:
+        cells = [Cell(text=_told(quantity, value), kind="number") for value in values]
     own = quantity.words.removeprefix(f"{SECTIONS.get(quantity.section, quantity.section)}, ")
-    return _row(own, cells, _change(comparison, quantity))
+    return _row(own, cells, _change(quantity, values))
 
 
 def _told(quantity: Quantity, value: Value) -> str:
@@ -179,38 +190,40 @@ def _told(quantity: Quantity, value: Value) -> str:
         return percent(float(value))
     if isinstance(value, Fraction) and quantity.section:
         return exact(value)
+    if 0 < value < NOTHING:
+        return size(Fraction(value))
     return down(value, 6) if any(word in quantity.name for word in _DOWN) else up(value, 6)
 
 
-def _change(comparison: Comparison, quantity: Quantity) -> str:
+def _change(quantity: Quantity, values: Sequence[Value]) -> str:
     """From the first of two to the second, in per cent."""
-    if len(comparison.sides) != 2 or quantity.share:
+    numbers = [float(value) for value in values if isinstance(value, (float, Fraction))]
+    if len(values) != 2 or len(numbers) != 2 or quantity.share or min(map(abs, numbers)) < NOTHING:
         return ""
-    one, other = (side.found.get(quantity.key) for side in comparison.sides)
-    first, second = (None if each is None else each.number for each in (one, other))
-    if first is None or second is None or first in (0, second):
+    first, second = numbers
+    if first == second:
         return ""
-    return f"{100 * (second - first) / abs(first):+.3g} %"
+    return f"{100 * (second - first) / abs(first):+.3g} %" if isfinite(first) and isfinite(second) else ""
 
 
-def _row(name: str, cells: Sequence[Cell], change: str) -> tuple[Cell, ...]:
+def _row(name: str, cells: Sequence[Cell], change: str = "") -> tuple[Cell, ...]:
     return (Cell(text=name), *cells, Cell(text=change, kind="number"))
 
 
-def _table(comparison: Comparison, first: str, rows: Sequence[tuple[Cell, ...]], note: str = "") -> Table:
+def _table(comparison: Comparison, rows: Sequence[tuple[Cell, ...]], note: str = "") -> Table:
     """A table with a column for each certificate, and the change where there are two of them."""
     two = len(comparison.sides) == 2 and any(row[-1].text for row in rows)
-    columns = (first, *comparison.names, *(("change",) if two else ()))
+    columns = ("", *comparison.names, *(("change",) if two else ()))
     return Table(columns=columns, rows=tuple(row if two else row[:-1] for row in rows), note=note)
 
 
-def _differing(comparison: Comparison) -> Iterator[Block]:
+def _differing(comparison: Comparison) -> Table:
     rows = [
-        _row(path, [Cell(text=_compact(value), kind="code") for value in own], "")
+        _row(path, [Cell(text=_compact(value), kind="code") for value in own])
         for path, own in list(comparison.differences.items())[:_MOST]
     ]
     left = len(comparison.differences) - len(rows)
-    yield _table(comparison, "key", rows, f"{left} more keys differ" if left else "" if rows else "nothing")
+    return _table(comparison, rows, f"{left} more keys differ" if left else "" if rows else "nothing")
 
 
 # -- names and differences

@@ -14,7 +14,7 @@ from math import log, sqrt
 from tubecert.digits import short
 from tubecert.report.figures_axes import LEFT, RIGHT, WIDTH, Axis, Chart, Point, number, text
 from tubecert.report.figures_gains import STYLES
-from tubecert.report.page import Figure
+from tubecert.report.page import Block, Figure, Figures, Page, Section, Words
 from tubecert.report.quantities import Quantity
 from tubecert.report.sweep import ERROR, Row, SweepTable
 from tubecert.sweep import grid
@@ -37,6 +37,14 @@ def sweep_figures(table: SweepTable) -> list[Figure]:
     if len(axes) == 1 and len(words) <= 1:
         return list(_curves(table, axes[0], words))
     return list(_maps(table, axes[0], axes[1])) if len(axes) == 2 and not words else []
+
+
+def with_figures(page: Page, drawn: Sequence[Figure]) -> Page:
+    """The page of a sweep with its figures, or with why there are none."""
+    shown: Block = Figures(figures=tuple(drawn))
+    if not drawn:
+        shown = Words(text="Figures are drawn for one or two keys whose values are numbers in order.")
+    return replace(page, sections=(*page.sections, Section(key="figures", title="Figures", blocks=(shown,))))
 
 
 def _ordered(values: Sequence[float]) -> bool:

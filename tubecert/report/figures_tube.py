@@ -1,25 +1,18 @@
-"""Figures of the tube: the plan, what is proven around it, the safe set, obstacles, witnesses, suprema.
+"""Figures of the tube: the plan, what is proven around it, the safe set, obstacles, witnesses.
 
 In: `result` of a certificate. Out: one figure per pair of states. Nothing is decided here.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-
-from tubecert.bounds.meanings import meaning
 from tubecert.certificate.result import Result
 from tubecert.digits import near
-from tubecert.enclosure.constant import Witness
 from tubecert.report.claimed import point
 from tubecert.report.figures_axes import Chart, Point
 from tubecert.report.figures_scene import Plane, draw_obstacle, scene
-from tubecert.report.outline import domain_outline, tube_outline
+from tubecert.report.outline import tube_outline
 from tubecert.report.page import Figure
 from tubecert.words.claims import title as title_of
-
-_NEAR = 0.25  # places closer than this part of rho share a number
 
 
 def planes(result: Result) -> list[Plane]:
@@ -86,63 +79,6 @@ def _obstacles(result: Result, plane: Plane, chart: Chart) -> list[tuple[str, st
             draw_obstacle(chart, obstacle, plane.names)
             shown = [("obstacle", "obstacle")]
     return shown
-
-
-# -- suprema
-
-
-def suprema_figures(result: Result) -> list[Figure]:
-    """Where on the tube the constants attain their suprema: numbered places, the numbers explained below."""
-    symbols = _places(result)
-    if not symbols:
-        return []
-    numbers = {x: str(i + 1) for i, x in enumerate(symbols)}
-    figures = []
-    for plane in planes(result):
-        if not plane.plan:
-            continue
-        key = f"suprema-{plane.index[0]}-{plane.index[1]}"
-        domain = replace(plane, tube=domain_outline(result, plane.index))
-        chart, _ = scene(key, domain, [plane.of(x) for x in symbols])
-        for place, found in _close(chart, plane, list(symbols)).items():
-            words = "; ".join(f"{numbers[x]}: {', '.join(symbols[x])}" for x in found)
-            chart.dot(place, "numbered", 8, words)
-            label = ",".join(numbers[x] for x in found) if len(found) < 3 else f"{numbers[found[0]]}+"
-            chart.label(place, label, "badge middle", (0.0, 3.5))
-        title = f"{plane.names[0]}, {plane.names[1]}"
-        figures.append(Figure(key=key, title=title, svg=chart.text()))
-    return figures
-
-
-def places(result: Result) -> tuple[str, ...]:
-    """What the numbers in the figures of suprema stand for."""
-    return tuple(f"{', '.join(s)} near {point(result, Witness(x=x))}" for x, s in _places(result).items())
-
-
-def _places(result: Result) -> dict[tuple[float, ...], list[str]]:
-    """The symbols of the constants by the state at which they were found largest; those that vanish left out."""
-    n = len(result.spec.effective.system.states)
-    near = _NEAR * (0.0 if result.tube is None else float(result.tube.rho))
-    found: dict[tuple[float, ...], list[str]] = {}
-    for name, item in sorted(result.constants.items()):
-        at = item.at
-        if at is not None and len(at.x) == n and item.above != 0:
-            here = tuple(float(f"{value:.4g}") for value in at.x)
-            place = next((x for x in found if math.dist(x, here) <= near), here)
-            found.setdefault(place, []).append(meaning(name).symbol)
-    return found
-
-
-def _close(
-    chart: Chart, plane: Plane, places: list[tuple[float, ...]]
-) -> dict[Point, list[tuple[float, ...]]]:
-    """Places that would cover each other in the drawing share a mark."""
-    groups: dict[Point, list[tuple[float, ...]]] = {}
-    for x in places:
-        here = plane.of(x)
-        near = next((p for p in groups if math.dist(chart.at(p), chart.at(here)) < 14), here)
-        groups.setdefault(near, []).append(x)
-    return groups
 
 
 def _pair(plane: Plane, value: Point) -> str:

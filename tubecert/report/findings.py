@@ -1,14 +1,17 @@
-"""Findings as text for people and as data for programs."""
+"""Findings as text for people, as a page, and as data for programs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias
 
 from rich.text import Text
 
-from tubecert.findings import Finding, Severity
+from tubecert.findings import Finding, Location, Severity
+from tubecert.records import Json
+from tubecert.report.page import Page, Section, Table
 
+Place: TypeAlias = Callable[[Location], str]
 _STYLES = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow", Severity.NOTE: "bold cyan"}
 
 
@@ -54,28 +57,33 @@ def summary(findings: Sequence[Finding], files: int) -> str:
     return f"{files} {noun} checked: {_count(findings)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FindingData:
-    """A finding for programs; file, line and column only where it has a place."""
-
-    code: str
-    severity: Severity
-    message: str
-    file: str | None = None
-    line: int | None = None
-    column: int | None = None
-    help: str | None = None
-
-
-def as_data(finding: Finding) -> FindingData:
-    """A finding for programs."""
-    place = finding.location
-    return FindingData(
-        code=finding.code,
-        severity=finding.severity,
-        message=finding.message,
-        file=None if place is None else place.file,
-        line=None if place is None else place.line,
-        column=None if place is None else place.column,
-        help=finding.help or None,
+def page_of(name: str, findings: Sequence[Finding], files: int = 1, place: Place = str) -> Page:
+    """The page of a check: every finding with its place, as `place` writes it, its words and its remedy."""
+    rows = (
+        (
+            str(item.severity),
+            "" if item.location is None else place(item.location),
+            item.code,
+            item.message,
+            item.help,
+        )
+        for item in findings
     )
+    table = Table.of(("", "where", "code", "what", "help"), rows)
+    wrong = any(item.severity is not Severity.NOTE for item in findings)
+    return Page(
+        name=name,
+        verdict="warning" if wrong else "checked",
+        summary=summary(findings, files),
+        sections=(Section(key="findings", title="Findings", blocks=(table,) if findings else ()),),
+        about="check",
+    )
+
+
+def as_data(finding: Finding) -> Json:
+    """A finding for programs; file, line and column only where it has a place."""
+    place, data = finding.location, dict[str, Any]()
+    data |= {"code": finding.code, "severity": finding.severity.value, "message": finding.message}
+    if place is not None:
+        data |= {"file": place.file, "line": place.line, "column": place.column}
+    return data | ({"help": finding.help} if finding.help else {})

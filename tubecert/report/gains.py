@@ -31,11 +31,7 @@ class Gains:
 
     def text(self, *, titled: bool = False) -> str:
         """The gains for the verdict line, with their certificate's name if there are several."""
-        omega = self.pair.bandwidth
-        parts = ["feedback alone" if omega is None else f"omega = {exact(omega)} rad/s"]
-        if self.pair.adaptation_rate is not None:
-            parts.append(f"Gamma = {exact(self.pair.adaptation_rate)}")
-        return (f"{NAMES[self.section]} " if titled else "") + ", ".join(parts)
+        return (f"{NAMES[self.section]} " if titled else "") + gains_text(self.pair)
 
     def words(self) -> str:
         """The gains in a sentence."""
@@ -52,6 +48,14 @@ class Gains:
         least = margins.get(tightest)
         known = least if least is not None and isfinite(least) else None
         return f"{percent(known)} {tightest}" if len(margins) > 1 and known is not None else percent(known)
+
+
+def gains_text(pair: Pair) -> str:
+    """A set of gains as one reads it."""
+    parts = ["feedback alone" if pair.bandwidth is None else f"omega = {exact(pair.bandwidth)} rad/s"]
+    if pair.adaptation_rate is not None:
+        parts.append(f"Gamma = {exact(pair.adaptation_rate)}")
+    return ", ".join(parts)
 
 
 def rows(result: Result) -> Iterator[Gains]:

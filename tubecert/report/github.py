@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 
 from tubecert.checking import Checked
 from tubecert.findings import Finding, Severity
 from tubecert.printable import visible
-from tubecert.report.findings import summary
+from tubecert.report import markdown
+from tubecert.report.findings import page_of, summary
 
 _COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
-_MARKS = {Severity.ERROR: "❌", Severity.WARNING: "⚠️", Severity.NOTE: "ℹ️"}
 _DATA = {"%": "%25", "\r": "%0D", "\n": "%0A"}
 _PROPERTY = _DATA | {":": "%3A", ",": "%2C"}
 _LARGEST_SUMMARY = 1_000_000  # GitHub refuses more than 1 MiB
@@ -66,38 +67,15 @@ def relative(file: str) -> str:
 
 
 def step_summary(results: Sequence[Checked]) -> str:
-    """The summary of a step, in Markdown."""
+    """The summary of a step, in Markdown, as far as GitHub takes it."""
     findings = [item for result in results for item in result.findings]
-    rows = ["### tubecert check", "", summary(findings, len(results)), ""]
-    if findings:
-        rows += ["| | file | code | what | help |", "|---|---|---|---|---|", *_rows(findings), ""]
-    text, size = [], 0
-    for row in rows:
-        size += len(row.encode()) + 1
-        if size > _LARGEST_SUMMARY:
-            text += ["", "... and more"]
-            break
-        text.append(row)
-    return "\n".join(text) + "\n"
-
-
-def _rows(findings: Iterable[Finding]) -> list[str]:
-    return [
-        f"| {_MARKS[item.severity]} | {_cell(_where(item))} | {item.code} | {_cell(item.message)} "
-        f"| {_cell(item.help)} |"
-        for item in findings
-    ]
-
-
-def _where(finding: Finding) -> str:
-    place = finding.location
-    return "" if place is None else f"{relative(place.file)}:{place.line}:{place.column}"
-
-
-def _cell(text: str) -> str:
-    """Text in a cell of a table: no markup, no line breaks."""
-    table = {character: f"\\{character}" for character in "\\`*_{}[]()#+-!|~>"} | {"<": "&lt;", "&": "&amp;"}
-    return _replaced(visible(" ".join(text.split())), table)
+    page = page_of(
+        "tubecert", findings, len(results), lambda at: f"{relative(at.file)}:{at.line}:{at.column}"
+    )
+    lines = markdown.render_page(page).splitlines(keepends=True)
+    sizes = accumulate(len(line.encode()) for line in lines)
+    kept = [line for line, size in zip(lines, sizes, strict=True) if size <= _LARGEST_SUMMARY]
+    return "".join(kept) + ("\n... and more\n" if len(kept) < len(lines) else "")
 
 
 def append_step_summary(results: Sequence[Checked]) -> None:

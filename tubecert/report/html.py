@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from tubecert.report.page import Page, typeset
+from tubecert.report.page import Page, look, typeset
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -33,4 +33,5 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["typeset"] = typeset
+    environment.filters["look"] = look
     return environment

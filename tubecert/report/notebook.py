@@ -1,84 +1,40 @@
-"""What a value of the library looks like in a notebook: a card with its verdict, a sentence, and a table or two.
+"""What a value of the library looks like in a notebook: a card with its verdict, a sentence, and what is seen first.
 
-In: pages, canonical specifications, verdict lines. Out: HTML that stands for itself. The template escapes every
-text.
+In: pages. Out: HTML that stands for itself. The template escapes every text.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from tubecert.certificate.effective import Effective
-from tubecert.findings import Finding, Severity
-from tubecert.printable import visible
-from tubecert.report.findings import summary
 from tubecert.report.html import environment
-from tubecert.report.page import Block, Cell, Facts, Page, Reason, Table
+from tubecert.report.page import Block, Cell, Facts, Page, Reason, Section, Table, Words
 from tubecert.report.page_origin import equations
-from tubecert.verdict import Verdict
+
+_MOST = 15  # rows of a table
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Card:
-    """A verdict (`style` is how it looks), what it is about, a sentence, and tables."""
-
-    verdict: str
-    name: str
-    style: str = ""
-    summary: str = ""
-    meaning: str = ""
-    tables: Sequence[Table] = ()
-
-
-def render(card: Card) -> str:
-    """The card as HTML."""
-    return environment().get_template("card.html").render(card=card)
-
-
-def of_line(line: str, name: str, style: str, details: Sequence[tuple[str, str]] = ()) -> str:
-    """The card of a verdict line (`certified NAME: what follows`), with names and values below it."""
-    verdict, _, summary = line.partition(f" {visible(name)}: ")
-    rows = tuple((Cell(text=what), Cell(text=value)) for what, value in details)
-    tables = [Table(columns=("", ""), rows=rows)] if rows else []
-    return render(Card(verdict=verdict, name=name, style=style, summary=summary, tables=tables))
+def of_page(page: Page) -> str:
+    """The card of a page: what it says, and its first section."""
+    tables = list(_tables(page.sections[0].blocks))
+    return environment().get_template("card.html").render(page=page, tables=tables)
 
 
 def specification(effective: Effective) -> str:
     """The card of a specification: its equations and its safe set."""
-    rows = [(Cell(text=line, kind="code"),) for line in equations(effective)]
     box = effective.part("safe_set")
     sides = ", ".join(f"{name} in [{', '.join(map(str, side))}]" for name, side in box.items())
-    rows.append((Cell(text=f"safe set: {sides}"),))
-    return render(
-        Card(
-            verdict="specification",
-            name=effective.name,
-            tables=[Table(columns=("",), rows=tuple(rows))],
-        )
+    rows = [*((Cell(text=line, kind="code"),) for line in equations(effective)), (Cell(text=sides),)]
+    system = Section(key="system", title="System", blocks=(Table(columns=("",), rows=tuple(rows)),))
+    page = Page(
+        name=effective.name,
+        verdict="",
+        about="specification",
+        summary="equations, safe set",
+        sections=(system,),
     )
-
-
-def findings(name: str, found: Sequence[Finding]) -> str:
-    """The card of a check: every finding with its place, and how many there are."""
-    style = Verdict.UNDECIDED if any(item.severity is not Severity.NOTE for item in found) else ""
-    rows = tuple((Cell(text=str(item.severity)), Cell(text=item.message, note=item.help)) for item in found)
-    tables = [Table(columns=("", ""), rows=rows)] if rows else []
-    return render(Card(verdict="checked", name=name, style=style, summary=summary(found, 1), tables=tables))
-
-
-def of_page(page: Page) -> str:
-    """The card of a page: what it says, and what is seen first of it."""
-    return render(
-        Card(
-            verdict=page.verdict,
-            style=page.verdict,
-            name=page.name,
-            summary=page.summary,
-            meaning=page.meaning,
-            tables=tuple(_tables(page.sections[0].blocks)),
-        )
-    )
+    return of_page(page)
 
 
 def _tables(blocks: Sequence[Block]) -> Iterator[Table]:
@@ -86,11 +42,17 @@ def _tables(blocks: Sequence[Block]) -> Iterator[Table]:
     for block in blocks:
         match block:
             case Table():
-                yield block
-            case Facts():
+                left = len(block.rows) - _MOST
                 yield Table(
-                    columns=("", ""), rows=tuple((Cell(text=name), cell) for name, cell in block.facts)
+                    columns=block.columns,
+                    rows=block.rows[:_MOST],
+                    note=f"{left} more" if left > 0 else block.note,
                 )
+            case Facts():
+                rows = ((Cell(text=name), cell) for name, cell in block.facts)
+                yield Table(columns=("", ""), rows=tuple(rows))
             case Reason():
                 told = Cell(text=block.message, note=f"help: {block.relax}" if block.relax else "")
                 yield Table(columns=("", ""), rows=((Cell(text=block.claim), told),))
+            case Words():
+                yield Table(columns=("",), rows=((Cell(text=block.text),),))

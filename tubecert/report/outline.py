@@ -43,12 +43,6 @@ def tube_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
     return Outline(turn=_ball(tube, float(tube.rho), pair), sides=sides)
 
 
-def domain_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
-    """The set |S (x - x*)| < rho over which every constant is bounded."""
-    tube = result.tube
-    return None if tube is None else Outline(turn=_ball(tube, float(tube.rho), pair))
-
-
 def _level(result: Result, tube: TubeData) -> float | None:
     """The distance that is not reached, dbar = sqrt(a) rho."""
     a = None if result.metric is None else result.metric.lower

@@ -1,15 +1,29 @@
 """A page as data: sections of blocks, with nothing of HTML or Markdown in it.
 
-`certificate_page` and `sampled_loop` fill it from a certificate; `text`, `html`, `markdown`, `notebook` show it.
+A function `page_of` fills it from what a command found; `text`, `html`, `markdown` and `notebook` show it.
 Every text is plain text: who shows it escapes it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Final, Literal
 
 Kind = Literal["text", "number", "code", "verdict"]
+_KINDS: Final[Mapping[str, Kind]] = {">": "number", "!": "verdict"}
+_ALIKE: Final[Mapping[str, str]] = {
+    "confirmed": "certified",
+    "metric proven": "certified",
+    "not falsified": "certified",
+    "contradicted": "refuted",
+    "falsified": "refuted",
+    "tube left": "refuted",
+    "error": "refuted",
+    "no result": "undecided",
+    "interrupted": "undecided",
+    "warning": "undecided",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,24 +66,40 @@ class Items:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """Names and values."""
+    """Names and values; a first screen that is full leaves those out whose names are `spare`, the first one first."""
 
     block: ClassVar[str] = "facts"
     facts: tuple[tuple[str, Cell], ...]
+    spare: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, rows: Iterable[tuple[str, str]], spare: tuple[str, ...] = ()) -> Facts:
+        """Plain texts by their names."""
+        return cls(facts=tuple((name, Cell(text=told)) for name, told in rows), spare=spare)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A table; every row has as many cells as there are columns."""
+    """A table; every row has as many cells as there are columns. `left` rows more are not shown."""
 
     block: ClassVar[str] = "table"
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+    left: int = 0
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.columns) for row in self.rows):
             raise ValueError("a row of a table has another number of cells than the table has columns")
+
+    @classmethod
+    def of(cls, columns: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> Table:
+        """Plain texts; a column named >... holds numbers, one named !... verdicts."""
+        kinds: list[Kind] = [_KINDS.get(column[:1], "text") for column in columns]
+        cells = (
+            tuple(Cell(text=text, kind=kind) for text, kind in zip(row, kinds, strict=True)) for row in rows
+        )
+        return cls(columns=tuple(column.lstrip(">!") for column in columns), rows=tuple(cells), note=note)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,11 +113,10 @@ class Listing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
-    """Figures side by side where there is room; `places` is what the numbers in them stand for, from 1."""
+    """Figures side by side where there is room."""
 
     block: ClassVar[str] = "figures"
     figures: tuple[Figure, ...]
-    places: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,12 +180,17 @@ class Page:
     name: str
     verdict: str  # empty where the page is about several
     summary: str
-    meaning: str
-    tiles: tuple[Tile, ...]
     sections: tuple[Section, ...]
+    meaning: str = ""
+    tiles: tuple[Tile, ...] = ()
     about: str = "certificate"
     claim: str = ""
     caveat: str = ""
+
+
+def look(verdict: str) -> str:
+    """Which of certified, refuted and undecided a word looks like; another word has no look."""
+    return _ALIKE.get(verdict, verdict)
 
 
 def typeset(text: str) -> str:

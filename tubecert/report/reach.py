@@ -15,6 +15,7 @@ from tubecert.verdict import Verdict
 
 _NOTABLE = 0.01  # of the range of the knots
 _NARROWER = 0.97  # of what was asked for
+_MANY = 10  # times its limits: no per cent
 _AT_THE_EDGE = 0.9  # of the room in the safe set
 
 
@@ -105,25 +106,25 @@ def clearances(result: Result) -> Iterator[str]:
 
 
 def input_lines(result: Result, own: InputData) -> Iterator[str]:
-    """How far an input with limits goes, and what takes it there, in the loop of every kind that decides."""
+    """How far an input with limits goes in the loop of every kind that decides; a table says what takes it there."""
     unit = result.spec.effective.system.units.get(own.input, "")
-    limits = f"limits [{end(own.limits[0])}, {end(own.limits[1])}]".rstrip()
-    plan = span_of(own.plan.least.below, own.plan.greatest.above)
+    limits = f"of {ends_of(own.limits)}"
     told = [key for key in result.decided_by if key in own.bounds]
     for key in told:
-        bound = own.bounds[key]
-        reaches = f"{span_of(bound.least, bound.greatest)} {unit}".rstrip()
         stays = "stays within" if own.verdict is Verdict.CERTIFIED else "is proven to stay within"
+        span = span_of(own.bounds[key].least, own.bounds[key].greatest)
         where = f" with {NAMES[key]}" if len(told) > 1 else ""
-        adapts = f", adaptation adds {up(bound.adaptation)}" if bound.adaptation else ""
-        yield (
-            f"{own.input} {stays} {reaches}{where}; {limits}: {used(own, key)} used (the plan is in {plan}, feedback "
-            f"adds {up(bound.feedback)}{adapts})"
-        )
+        yield f"{stays} {span} {unit}".rstrip() + f"{where} {limits}: {used(own, key)} used"
     if not told:
-        yield f"{own.input} is in {plan} on the plan; {limits}; nothing is proven of it in the loop"
+        plan = span_of(own.plan.least.below, own.plan.greatest.above)
+        yield f"is in {plan} {limits} on the plan; nothing is proven of it in the loop"
     if own.verdict is Verdict.REFUTED:
-        yield f"{own.input} of the plan itself leaves its limits"
+        yield "leaves its limits on the plan itself"
+
+
+def ends_of(limits: tuple[Fraction, Fraction]) -> str:
+    """A range as it is declared."""
+    return f"[{end(limits[0])}, {end(limits[1])}]"
 
 
 def span_of(low: float, high: float) -> str:
@@ -134,7 +135,9 @@ def span_of(low: float, high: float) -> str:
 def used(own: InputData, key: str) -> str:
     """How much of its limits an input uses: 0 % in the middle of them, 100 % at one of them."""
     share = own.use([key])
-    return UNKNOWN if share is None else f"{up(100 * share, 3)} %"
+    if share is None:
+        return UNKNOWN
+    return f"{up(100 * share, 3)} %" if share < _MANY else f"{up(share, 3)} times what there is"
 
 
 def radii(tube: TubeData) -> str:
@@ -169,10 +172,3 @@ def _rest(result: Result, ultimate: float) -> str:
     if tube is None or tube.coordinates is None:
         return f"|x - x*| <= {up(ultimate)}"
     return f"|x_i - x_i*| <= {up(100 * ultimate / float(tube.rho), 3)} % of the half-widths"
-
-
-def safe_set(result: Result) -> Iterator[tuple[str, tuple[Fraction, Fraction]]]:
-    """The range of every state, in the order of the states."""
-    for name in result.spec.effective.system.states:
-        if name in result.safe_set:
-            yield name, result.safe_set[name]

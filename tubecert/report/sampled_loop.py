@@ -137,9 +137,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     left = len(system.states) - len(names)
     return Table(
         columns=tuple(head),
-        rows=tuple(
-            (Cell(text=row[0]), *(Cell(text=told, kind="number") for told in row[1:])) for row in rows
-        ),
+        rows=tuple(tuple(Cell(text=told) for told in row) for row in rows),
         note=f"{left} more with -v" if left else "",
     )
 

@@ -1,86 +1,84 @@
-"""The report of a simulation of a sampled loop: what broke first, then what was attained. It claims nothing."""
+"""A simulation of a sampled loop as a page: what broke first, then what was attained. It claims nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
-
-from rich.text import Text
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
 
 from tubecert.digits import short, up
 from tubecert.report.claimed import ends
-from tubecert.report.layout import indented, kept_in, plain_table
-from tubecert.report.simulation import CAVEAT, STYLES
+from tubecert.report.page import Block, Facts, Page, Reason, Section, Table, Words
+from tubecert.report.simulation import CAVEAT
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-    from rich.table import Table
-
     from tubecert.simulation.sampled.campaign import Campaign, Violation
 
-_CODES = {"c": "the controller is the exported C code", "floats": "the controller's tables in floats"}
+_CODES: Final = {"c": "the controller is the exported C code", "floats": "the controller's tables in floats"}
+_FIRST: Final = 2  # of what broke, on the first screen
 
 
-def verdict_line(own: Campaign) -> Text:
-    """The outcome on one line."""
-    line = Text(no_wrap=True, overflow="ignore")
-    line.append(own.outcome, style=STYLES[own.outcome])
-    line.append(f" {own.setting.spec.name}: ", style="bold")
-    return line.append(_because(own))
+def page_of(own: Campaign) -> Page:
+    """The page of a campaign."""
+    broken = [Reason(verdict="falsified", claim=each.of, message=_told(each)) for each in own.violations]
+    more = Section(key="broken", title="Everything that broke", blocks=tuple(broken))
+    return Page(
+        name=own.setting.spec.name,
+        verdict=own.outcome,
+        summary=_because(own),
+        meaning=CAVEAT,
+        sections=(
+            Section(key="runs", title="Runs", blocks=(*broken[:_FIRST], *_runs(own))),
+            *([more] if len(broken) > _FIRST else []),
+        ),
+        about="simulation",
+    )
 
 
-def report(own: Campaign, *, folder: str, files: Sequence[str], verbose: bool) -> list[RenderableType]:
-    """The whole report as renderables; `folder` holds the `files`."""
+def _runs(own: Campaign) -> Iterator[Block]:
     aimed, lasts = int(own.aimed.sum()), short(own.setting.samples * own.setting.Ts)
     about = f"{aimed} adversaries and {own.runs - aimed} random runs over {lasts} s, seed {own.attack.seed}"
-    parts: list[RenderableType] = [
-        Text(CAVEAT),
-        Text(f"{about}; {_CODES[own.controller]}"),
-        *(Text(_told(violation), "red") for violation in own.violations[: None if verbose else 3]),
-        _shares(own),
-        *map(Text, _ranges(own)),
-    ]
-    return [verdict_line(own), *map(indented, parts), kept_in(folder, files)]
+    yield Words(text=f"{about}; {_CODES[own.controller]}.")
+    yield _shares(own)
+    yield Facts.of([*_ranges(own)])
 
 
 def _because(own: Campaign) -> str:
-    runs = f"{own.runs} runs"
+    runs, attained = f"{own.runs} runs", short(own.attained)
     match own.outcome:
         case "falsified" if violations := own.violations:
-            return f"the tube is left in {len(own.outside)} of {runs}, first {_told(violations[0])}"
+            first = f"{violations[0].of}, {_told(violations[0])}"
+            return f"the tube is left in {len(own.outside)} of {runs}, first {first}"
         case "falsified":
             return f"an input or an obstacle is not as certified ({runs})"
         case "no result":
             error = short(own.error)
             return f"an integration is wrong by {error} of a half-width: too much to judge ({runs})"
         case "interrupted":
-            return (
-                f"{own.runs} of {own.asked} runs finished, which attained {short(own.attained)} of the tube"
-            )
-    return f"0 of {runs} left the tube, of which {short(own.attained)} was attained"
+            return f"{own.runs} of {own.asked} runs finished, which attained {attained} of the tube"
+    return f"0 of {runs} left the tube, of which {attained} was attained"
 
 
 def _told(own: Violation) -> str:
     who, peak = f"adversary of {own.aimed}" if own.aimed else "random", own.peak
-    where = f"by {own.of} at t = {short(peak.t)} s in run {peak.run} ({who})"
-    return f"{where}: {short(peak.value)}, proven {up(peak.bound)}"
+    return f"{short(peak.value)}, proven {up(peak.bound)}; t = {short(peak.t)} s, run {peak.run} ({who})"
 
 
 def _shares(own: Campaign) -> Table:
+    """The largest share of what is proven of every state and input."""
     late = [">in the long run"] if len(own.setting.stages) > 1 else []
-    table = plain_table("largest share of what is proven", ">adversaries", ">random runs", *late, "at", "by")
+    rows = []
     for i, name in enumerate(own.setting.names):
         peaks = [own.peak(i, own.aimed), own.peak(i, ~own.aimed)]
         shares = ["" if peak is None else short(peak.share, 3) for peak in peaks]
         long_run = [short(float(own.by_stage[:, i, -1].max()), 3)] * len(late)
         most = max(filter(None, peaks), key=lambda peak: peak.share)
-        table.add_row(name, *shares, *long_run, f"t = {short(most.t)} s", f"run {most.run}")
-    return table
+        rows.append((name, *shares, *long_run, f"t = {short(most.t)} s", str(most.run)))
+    return Table.of(("attained", ">adversaries", ">random runs", *late, "at", "in run"), rows)
 
 
-def _ranges(own: Campaign) -> Iterator[str]:
+def _ranges(own: Campaign) -> Iterator[tuple[str, str]]:
     for name, went in own.went.items():
         proven = went.proven and f", proven: {ends(*went.proven)}"
-        yield f"{name} went from {short(went.least)} to {short(went.greatest)}{proven or ''}"
+        yield name, f"went from {short(went.least)} to {short(went.greatest)}{proven or ''}"
     for i, passed in enumerate(own.passed, 1):
-        yield f"obstacle {i}: {short(passed.distance)} away at least"
+        yield f"obstacle {i}", f"{short(passed.distance)} away at least"

@@ -1,4 +1,4 @@
-"""The table of a sweep: a row for every point, from what is kept of it; nothing is computed again."""
+"""A sweep as a table and as a page: a row for every point, from what is kept of it; nothing is computed again."""
 
 from __future__ import annotations
 
@@ -9,26 +9,22 @@ from dataclasses import dataclass
 from io import BytesIO, StringIO
 from typing import TYPE_CHECKING, Final
 
-from rich.text import Text
-
 from tubecert.digits import exact, up
 from tubecert.report.claimed import size
 from tubecert.report.gains import deciding
-from tubecert.report.layout import VERDICTS, plain_table
+from tubecert.report.page import Page, Section, Table
 from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sweep.grid import Axis
 from tubecert.sweep.point import Failed, Kept, Point
+from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import promise
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from tubecert.certificate.result import Certificate
 
 ERROR: Final = "error"
-_SHOWN: Final = 40  # rows on a terminal
-_OWN: Final = ("verdict", "failed", "certificate")
+_MOST: Final = 500  # rows on a page
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,28 +168,30 @@ def _told(values: Sequence[Value], axis: Axis | None) -> list[float | str | None
     return [value if value is None or isinstance(value, str) else float(value) for value in values]
 
 
-def summary(table: SweepTable) -> Text:
-    """How many points came to what, on one line."""
-    line = Text()
-    line.append(f"{table.name}: {len(table.rows)} points", style="bold")
-    counts = [(verdict, table.count(str(verdict))) for verdict in VERDICTS]
-    for verdict, count in counts:
-        if count:
-            line.append(f", {count} ").append(str(verdict), style=f"bold {VERDICTS[verdict]}")
-    errors = table.count(ERROR)
-    if errors:
-        line.append(f", {errors} ").append("invalid or broken", style="bold red")
-    return line
+def page_of(table: SweepTable) -> Page:
+    """The page; the whole table is in a file beside it. Figures are left to `figures_sweep`, which draws them."""
+    keys = ", ".join(f"{axis.path} ({len(axis.texts)} values)" for axis in table.axes)
+    return Page(
+        name=table.name,
+        verdict="",
+        summary=_summary(table),
+        meaning=f"Each point is a certification of its own. The keys that were changed: {keys}.",
+        sections=(Section(key="points", title="Points", blocks=(_points(table),)),),
+        about="sweep",
+    )
 
 
-def report(table: SweepTable, files: Sequence[str]) -> list[RenderableType]:
-    """The summary, the first rows, and what was written."""
-    keys = [f">{axis.path}" for axis in table.axes]
-    heads = [f">{head}" if head == "rho" else head for head in table.headings]
-    rows = plain_table(*keys, *heads, wrapped=len(keys) + len(heads) - 1)
-    for row in table.rows[:_SHOWN]:
-        rows.add_row(*map(Text, table.texts(row)))
-    parts: list[RenderableType] = [summary(table), Text(), rows]
-    if len(table.rows) > _SHOWN:
-        parts.append(Text(f"... and {len(table.rows) - _SHOWN} more, in the table", style="dim"))
-    return [*parts, Text(), *(Text(file, no_wrap=True, overflow="ignore") for file in files)]
+def _summary(table: SweepTable) -> str:
+    """How many points came to what."""
+    counts = {str(verdict): table.count(str(verdict)) for verdict in Verdict}
+    counts["invalid or broken"] = table.count(ERROR)
+    said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
+    return f"{len(table.rows)} points, {said}"
+
+
+def _points(table: SweepTable) -> Table:
+    marks = {"rho": ">", "verdict": "!"}
+    heads = (*(f">{axis.path}" for axis in table.axes), *(marks.get(h, "") + h for h in table.headings))
+    left = len(table.rows) - _MOST
+    note = f"{left} more are in table.csv" if left > 0 else ""
+    return Table.of(heads, map(table.texts, table.rows[:_MOST]), note)

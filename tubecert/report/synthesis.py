@@ -1,27 +1,20 @@
-"""The report of a synthesis: the metric and what was proven of it, the metrics compared, or why there is none."""
+"""A synthesis as a page: the metric and what was proven of it, the metrics compared, or why there is none."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Final
 
-from rich.text import Text
-
-from tubecert.digits import UNKNOWN, down, end, exact, short, up
+from tubecert.digits import down, end, exact, short, up
 from tubecert.expression import free_symbols, parse, symbol
-from tubecert.printable import visible
 from tubecert.report.claimed import place
-from tubecert.report.cut import cut_short
-from tubecert.report.layout import VERDICTS, indented, plain_table, titled
+from tubecert.report.page import Block, Facts, Items, Page, Section, Table, Words
 from tubecert.words.advice import advice
 from tubecert.words.claims import message, outcome
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from tubecert.certificate.metric_file import MetricFile
     from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SearchData
-    from tubecert.spec import Spec
 
 FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts
@@ -30,7 +23,16 @@ _COLUMNS = (
     "lets inputs act over the tube (tubecert explain 'beta/sqrt(a)')."
 )
 _HARDLY = 1.05  # times as much
-_NONE = "no metric that certifies was found by then"
+_BEST: Final = "this is the best of what was proven by then"
+_NONE: Final = "no metric that certifies was found by then"
+_CUT: Final = {  # why a search was ended before its end, and what that means for what is shown
+    "deadline": "cut short by the deadline: {}",
+    "interrupted": "interrupted: {}",
+    "no_adaptation": "ended with the first metric whose tube needs no adaptation (certificate 0): one of less, or of a "
+    "narrower tube, is looked for with --objective adaptation or tube",
+    "plan": "ended after two rates at which the plan alone misses the dynamics by more than the tube allows: it is the "
+    "plan that has to be mended",
+}
 _CAUSES = {
     "distance": "{more}: the distance that the uncertainty drives the state grows as 1/rate",
     "gains": "no gains suffice: the distance that the uncertainty drives the state leaves no room in the tube",
@@ -42,63 +44,51 @@ _CAUSES = {
 }
 
 
-def verdict_line(data: SearchData, file: MetricFile | None, name: str) -> Text:
-    """What came of it, on one line."""
-    if file is None:
-        line = Text.assemble((data.verdict, f"bold {VERDICTS[data.verdict]}"), (f" {name}: ", "bold"))
-        return line if data.reason is None else line.append(message(data.reason))
-    line = Text.assemble(("metric proven", "bold green"), (f" {name}: ", "bold"))
-    line.append(f"rate {exact(file.rate)} 1/s, condition number {up(file.condition_number.above)}")
-    if file.margin is not None:
-        line.append(f", margin {down(file.margin.below, 3)} 1/s")
-    return line
-
-
-def report(data: SearchData, file: MetricFile | None, system: Spec, target: str) -> list[RenderableType]:
-    """The whole report as renderables; `target` is the metric file."""
-    name = system.name
-    parts: list[RenderableType] = [verdict_line(data, file, name)]
-    if file is not None:
-        parts += map(indented, _proven(file))
-    if data.table:
-        parts += titled("Metrics compared", [_compared(data.table), Text(_COLUMNS, style="dim")])
-    if data.limits is not None and (lines := _limits(data.limits)):
-        parts += titled("What limits the rate", lines)
-    if data.cut is not None:
-        parts += cut_short(data.cut, _NONE) if file is None else cut_short(data.cut)
-    if file is None:
-        return [*parts, *_failure(data, system.states)]
-    certify = f"certify with it: tubecert certify {visible(system.path)} --metric {target}"
-    if system.lacks:
-        certify = f"to certify with it, add {' and '.join(system.lacks)} to {visible(system.path)}"
-    return [*parts, Text(), Text(f"Metric: {target}"), Text(certify, style="dim")]
-
-
-def _failure(data: SearchData, states: Sequence[str]) -> list[RenderableType]:
-    """What would help, and what was tried."""
-    parts: list[RenderableType] = []
-    reason = data.reason
-    if reason is not None and reason.at is not None:
-        parts.append(indented(Text(f"at {place(states, reason.at)}")))
-    if reason is not None and (relax := advice(reason.relax)):
-        parts.append(indented(Text.assemble(("help: ", "green"), relax)))
-    if data.attempts:
-        parts += titled("Tried", _tried(data.attempts))
-    return parts
-
-
-def _proven(file: MetricFile) -> list[Text]:
-    sides = ", ".join(
-        f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in file.verified_on.items()
-    )
-    solver = file.solver
-    found = f"{solver.digits} digits ({solver.route})"
-    return [
-        Text(f"proven on {sides}: C1 and C2 by branch and bound, C3 exactly"),
-        Text(
-            f"{down(1 / file.upper.above)} I <= W <= {up(1 / file.lower.below)} I; W {_kind(file)}, {found}"
-        ),
+def page_of(data: SearchData, file: MetricFile | None, name: str, states: Sequence[str] = ()) -> Page:
+    """The page of a search in a system of this name; `file` is the metric, None if there is none."""
+    sections = [
+        Section(key=key, title=title, blocks=blocks)
+        for key, title, made in (
+            ("metric", "Metric", _first(data, file, states)),
+            ("tried", "Tried", _tried(data.attempts)),
+        )
+        if (blocks := tuple(made)) or key == "metric"
     ]
+    return Page(
+        name=name,
+        verdict=data.verdict if file is None else "metric proven",
+        summary=_numbers(file) if file is not None else message(data.reason) if data.reason else "",
+        sections=tuple(sections),
+        about="synthesis",
+    )
+
+
+def _numbers(file: MetricFile) -> str:
+    margin = "" if file.margin is None else f", margin {down(file.margin.below, 3)} 1/s"
+    return f"rate {exact(file.rate)} 1/s, condition number {up(file.condition_number.above)}{margin}"
+
+
+def _first(data: SearchData, file: MetricFile | None, states: Sequence[str]) -> Iterator[Block]:
+    """What was proven, or what would help; the metrics that were compared."""
+    reason = data.reason
+    if file is not None:
+        yield Facts.of(_proven(file))
+    elif reason is not None:
+        helped = ("at", place(states, reason.at) if reason.at else ""), ("help", advice(reason.relax))
+        yield Facts.of((what, told) for what, told in helped if told)
+    if data.table:
+        yield _compared(data.table)
+    if data.limits is not None and (lines := tuple(_limits(data.limits))):
+        yield Items(title="What limits the rate", items=lines)
+    if data.cut is not None:
+        yield Words(text=_CUT[data.cut].format(_NONE if file is None else _BEST))
+
+
+def _proven(file: MetricFile) -> Iterator[tuple[str, str]]:
+    sides = (f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in file.verified_on.items())
+    yield "proven on", f"{', '.join(sides)}: C1 and C2 by branch and bound, C3 exactly"
+    bounds = f"{down(1 / file.upper.above)} I <= W <= {up(1 / file.lower.below)} I"
+    yield "W", f"{bounds}; W {_kind(file)}, {file.solver.digits} digits ({file.solver.route})"
 
 
 def _kind(file: MetricFile) -> str:
@@ -109,45 +99,38 @@ def _kind(file: MetricFile) -> str:
     return f"depends on {', '.join(moving)}" if moving else "is constant"
 
 
-def _limits(limits: RateLimits) -> list[Text]:
+def _limits(limits: RateLimits) -> Iterator[str]:
     """What is against slower and against faster rates, in words."""
-    lines = []
     for side, limit in (("slower", limits.slower), ("faster", limits.faster)):
         if limit is None:
             continue
         more = "more gain" if limit.factor is None else f"{short(limit.factor, 2)} times the gain"
         if limit.factor is not None and limit.factor < _HARDLY:
             more = "hardly more gain"
-        lines.append(Text(f"{side}: at {exact(limit.rate)} 1/s {_CAUSES[limit.cause].format(more=more)}"))
-    return lines
+        yield f"{side}: at {exact(limit.rate)} 1/s {_CAUSES[limit.cause].format(more=more)}"
 
 
-def _compared(rows: Sequence[MetricRow]) -> RenderableType:
-    heads = ["least", ">condition number", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "verdict"]
-    degrees = len({row.degree for row in rows}) > 1  # else all rows of a rate differ by what is least
-    shown = plain_table(">rate", *([">degree"] if degrees else []), *heads)
-    for row in rows:
-        shown.add_row(
+def _compared(found: Sequence[MetricRow]) -> Table:
+    """A metric a row."""
+    heads = ["least", ">condition number", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "!verdict"]
+    degrees = len({row.degree for row in found}) > 1  # else all rows of a rate differ by what is least
+    rows = (
+        (
             exact(row.rate),
             *([str(row.degree)] if degrees else []),
             FLOORS[row.floor],
             up(row.condition_number),
-            _number(row.input_gain),
-            _number(row.rho),
-            _number(row.bandwidth),
-            _number(row.adaptation_rate),
-            Text() if row.verdict is None else Text(row.verdict, style=VERDICTS[row.verdict]),
+            *map(up, (row.input_gain, row.rho, row.bandwidth, row.adaptation_rate)),
+            row.verdict or "",
         )
-    return shown
+        for row in found
+    )
+    return Table.of((">rate", *([">degree"] if degrees else []), *heads), rows, _COLUMNS)
 
 
-def _tried(attempts: Sequence[AttemptData]) -> list[Text]:
-    lines = [
-        Text(f"rate {short(a.rate, 6)}, degree {a.degree}: {outcome(a.outcome)}") for a in attempts[-_SHOWN:]
-    ]
-    left = len(attempts) - len(lines)
-    return [*([Text(f"({left} attempts before these)", style="dim")] if left else []), *lines]
-
-
-def _number(value: float | None) -> str:
-    return UNKNOWN if value is None else up(value)
+def _tried(attempts: Sequence[AttemptData]) -> Iterator[Block]:
+    lines = [f"rate {short(a.rate, 6)}, degree {a.degree}: {outcome(a.outcome)}" for a in attempts[-_SHOWN:]]
+    if left := len(attempts) - len(lines):
+        yield Words(text=f"{left} attempts before these")
+    if lines:
+        yield Items(items=tuple(lines))

@@ -1,23 +1,33 @@
-"""A page on a terminal: what it claims, the first section, where files are; all sections if more is asked for."""
+"""A page on a terminal: what it claims, the first section on one screen, where files are; with more asked for, all.
+
+A first screen has at most 15 lines, files and next commands among them, at whatever width: facts that matter less,
+then the last rows of tables, are left to `-v`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, Literal
 
 from rich.console import Group
+from rich.padding import Padding
 from rich.table import Table as Grid
 from rich.text import Text
 
-from tubecert.report.layout import VERDICTS, indented, plain_table, titled
-from tubecert.report.page import Block, Cell, Facts, Items, Listing, Page, Reason, Table, Words
-from tubecert.verdict import Verdict
+from tubecert.report.page import Block, Cell, Facts, Items, Listing, Page, Reason, Table, Words, look
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 
+_MOST: Final = 15  # lines of a first screen
+_FEWEST: Final = 2  # rows of a table that is cut
 _LABELS: Final = 12  # characters of the names before values
-_ASCII: Final = str.maketrans({"ω": "omega", "Γ": "Gamma", "ρ": "rho", "±": "+-", "≤": "<=", "≥": ">="})
+_COLORS: Final = {"certified": "green", "refuted": "red", "undecided": "yellow"}
+_ASCII: Final = str.maketrans(
+    {"ω": "omega", "Γ": "Gamma", "ρ": "rho", "λ": "lambda", "±": "+-", "≤": "<=", "≥": ">=", "…": "..."}
+)
+Rows = Sequence[tuple[str, str]]
 
 
 def headline(page: Page) -> Text:
@@ -25,26 +35,80 @@ def headline(page: Page) -> Text:
     return _led(page, page.summary)
 
 
-def screen(page: Page, closing: Sequence[tuple[str, str]], *, verbose: bool) -> list[RenderableType]:
+def screen(page: Page, closing: Rows, *, verbose: bool) -> list[RenderableType]:
     """The page; `closing` are files and commands, which are neither wrapped nor cut."""
-    first, *others = page.sections
-    parts: list[RenderableType] = [_led(page, page.claim or page.summary)]
-    if page.verdict != Verdict.CERTIFIED:
-        parts.append(indented(_text(page.meaning)))
-    parts += map(indented, _shown(first.blocks))
-    for section in others if verbose else ():
+    if not verbose:
+        return [_First(page, closing)]
+    parts = list(_opening(page, page.sections[0].blocks))
+    for section in page.sections[1:]:
         if body := list(_shown(section.blocks)):
-            parts += titled(section.title, body)
-    parts += [Text()] if verbose else []
-    for what, where in closing:
+            parts += [Text(), Text(section.title, style="bold"), *map(_indented, body)]
+    return [*parts, Text(), *_closing(closing)]
+
+
+@dataclass(frozen=True, slots=True)
+class _First:
+    """A first screen, made to fit when the width is known."""
+
+    page: Page
+    closing: Rows
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        blocks: Sequence[Block] | None = self.page.sections[0].blocks
+        while blocks is not None:
+            shown = Group(*_opening(self.page, blocks))
+            lines = len(console.render_lines(shown, options, pad=False))
+            blocks = _fewer(blocks) if lines + len(self.closing) > _MOST else None
+        yield shown
+        yield from _closing(self.closing)
+
+
+def _fewer(blocks: Sequence[Block]) -> Sequence[Block] | None:
+    """The blocks without a note, else the fact that matters least, else the last row of the longest table; or None."""
+    for i, block in enumerate(blocks):
+        if isinstance(block, Table) and block.note:
+            return [*blocks[:i], replace(block, note=""), *blocks[i + 1 :]]
+        names = [] if not isinstance(block, Facts) else [name for name, _ in block.facts]
+        if isinstance(block, Facts) and (spare := next((n for n in block.spare if n in names), None)):
+            last = len(names) - 1 - names[::-1].index(spare)
+            return [*blocks[:i], replace(block, facts=_without(block.facts, last)), *blocks[i + 1 :]]
+    tables = [(len(block.rows), i) for i, block in enumerate(blocks) if isinstance(block, Table)]
+    longest, i = max(tables, default=(0, 0))
+    table = blocks[i] if longest > _FEWEST else None
+    if not isinstance(table, Table):
+        return None
+    rows = table.rows[: min(longest - 1, _MOST)]
+    return [*blocks[:i], replace(table, rows=rows, left=table.left + longest - len(rows)), *blocks[i + 1 :]]
+
+
+def _without(facts: tuple[tuple[str, Cell], ...], index: int) -> tuple[tuple[str, Cell], ...]:
+    return facts[:index] + facts[index + 1 :]
+
+
+def _opening(page: Page, blocks: Sequence[Block]) -> Iterator[RenderableType]:
+    yield _led(page, page.claim or page.summary)
+    if page.verdict != "certified" and page.meaning:
+        yield _indented(_text(page.meaning))
+    yield from map(_indented, _shown(blocks))
+
+
+def _closing(rows: Rows) -> Iterator[Text]:
+    for what, where in rows:
         label = (f"  {what:<{_LABELS}}", "bold")
-        parts.append(Text.assemble(label, where, no_wrap=True, overflow="ignore"))
-    return parts
+        yield Text.assemble(label, where, no_wrap=True, overflow="ignore")
 
 
 def _led(page: Page, words: str) -> Text:
-    verdict = (page.verdict, f"bold {VERDICTS[Verdict(page.verdict)]}")
-    return Text.assemble(verdict, (f" {page.name}: ", "bold"), words.translate(_ASCII))
+    verdict = (f"{page.verdict} ", f"bold {_color(page.verdict)}") if page.verdict else ""
+    return Text.assemble(verdict, (f"{page.name}: ", "bold"), words.translate(_ASCII))
+
+
+def _color(verdict: str) -> str:
+    return _COLORS.get(look(verdict), "")
+
+
+def _indented(item: RenderableType) -> Padding:
+    return Padding(item, (0, 0, 0, 2), expand=False)
 
 
 def _shown(blocks: Sequence[Block]) -> Iterator[RenderableType]:
@@ -64,7 +128,8 @@ def _shown(blocks: Sequence[Block]) -> Iterator[RenderableType]:
                 yield _reason(block)
             case Table():
                 yield _table(block)
-                yield from (_text(block.note, "dim"),) if block.note else ()
+                notes = (block.note, f"{block.left} more with -v" if block.left else "")
+                yield from (_text(note, "dim") for note in notes if note)
 
 
 def _facts(rows: Sequence[tuple[str, RenderableType]]) -> Grid:
@@ -77,10 +142,15 @@ def _facts(rows: Sequence[tuple[str, RenderableType]]) -> Grid:
 
 
 def _table(block: Table) -> Grid:
-    """A table, of which the column with the longest text is wrapped."""
-    widest = [max((len(row[i].text) for row in block.rows), default=0) for i in range(len(block.columns))]
-    columns = (column.translate(_ASCII) for column in block.columns)
-    grid = plain_table(*columns, wrapped=widest.index(max(widest)))
+    """A table without lines, of which the column with the longest text is wrapped."""
+    widest = [max((len(cell.text) for cell in column), default=0) for column in zip(*block.rows, strict=True)]
+    grid = Grid(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    grid.show_header = any(block.columns)
+    for i, column in enumerate(block.columns):
+        number = bool(block.rows) and block.rows[0][i].kind == "number"
+        justify: Literal["left", "right"] = "right" if number else "left"
+        wrapped = bool(widest) and widest[i] == max(widest)
+        grid.add_column(column.translate(_ASCII), justify=justify, overflow="fold", no_wrap=not wrapped)
     grid.columns[0].min_width = _LABELS - 2
     for row in block.rows:
         grid.add_row(*map(_cell, row))
@@ -89,14 +159,14 @@ def _table(block: Table) -> Grid:
 
 def _reason(block: Reason) -> RenderableType:
     """A claim that does not hold, where, and what would help."""
-    about = (block.verdict, VERDICTS[Verdict(block.verdict)]), (f" {block.claim}", "bold")
+    about = (block.verdict, _color(block.verdict)), (f" {block.claim}", "bold")
     told = Text.assemble(*about, f": {block.message}".translate(_ASCII))
     more = [(name, _text(words)) for name, words in (("at", block.at), ("help", block.relax)) if words]
     return Group(told, _facts(more)) if more else told
 
 
 def _cell(cell: Cell) -> Text:
-    style = VERDICTS[Verdict(cell.text)] if cell.kind == "verdict" else ""
+    style = _color(cell.text) if cell.kind == "verdict" else ""
     return Text.assemble((cell.text.translate(_ASCII), style), (f"\n{cell.note}", "dim") if cell.note else "")
 
 

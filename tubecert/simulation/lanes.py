@@ -59,7 +59,7 @@ class System(Protocol):
 class Found(NamedTuple):
     """What N lanes leave behind.
 
-    `seen` (K, .., N) at the output times, nan where they did not come; `peak` (-inf where there is none) and `peak_time`
+    `seen` (K, .., N) at the output times, nan where they did not come; `peak` (-inf where there is none), `peak_time`
     (N,) by name; `least` and `greatest` (m, N) of the inputs; why (0: it was not) and when a lane was `stopped`,
     `ended` (N,).
     """
