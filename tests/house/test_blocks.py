@@ -33,8 +33,12 @@ ELSEWHERE = {
     "docs/howto/metric.md": "test_howto.py",
     "docs/howto/plan.md": "test_howto.py",
     "docs/reference/codes.md": "tests/spec/test_schema.py, tests/cli/test_everyday.py: fragments of `explain`",
-    "docs/theory.md": "formulas; test_docs.py numbers them, tests/conditions evaluates them",
-    "docs/theory-sampled-loop.md": "formulas; tests/machines attacks what they prove",
+    **{
+        path.relative_to(
+            ROOT
+        ).as_posix(): "formulas; test_docs.py numbers them, the tests of their rooms evaluate them"
+        for path in (ROOT / "docs" / "theory").glob("*.md")
+    },
 }
 
 # commands that are read but not run, by how they begin: why

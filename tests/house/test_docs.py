@@ -21,7 +21,9 @@ PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
 INDEX = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-THEORY = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+THEORY = "\n".join(
+    path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs" / "theory").glob("*.md"))
+)
 REFERENCE = re.compile(r"`(tubecert(?:\.\w+)*):(\w+(?:\.\w+)*)`")
 MODULE = re.compile(r"`(tubecert(?:\.\w+)+)`")
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
@@ -100,10 +102,10 @@ def test_links_resolve(page):
 
 
 def test_numbered_equations_are_defined_once_and_exist():
-    defined = re.findall(r"\s{2,}\((\d\.\d+)\)$", THEORY, re.M)
-    assert len(defined) == len(set(defined)) > 30
+    defined = re.findall(r"\s{2,}\(([D\d]\.\d+)\)$", THEORY, re.M)
+    assert len(defined) == len(set(defined)) > 60
     for page in PAGES:
-        used = set(re.findall(r"\((\d\.\d+)\)", page.read_text(encoding="utf-8")))
+        used = set(re.findall(r"\(([D\d]\.\d+)\)", page.read_text(encoding="utf-8")))
         assert used <= set(defined), f"{page.name}: {sorted(used - set(defined))}"
 
 

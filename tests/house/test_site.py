@@ -2,9 +2,12 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -14,6 +17,7 @@ DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
 
 import execute  # noqa: E402
+import typeset  # noqa: E402
 
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 
@@ -28,6 +32,36 @@ def entries(node: object) -> set[str]:
 def test_every_page_is_in_the_navigation():
     pages = {path.relative_to(DOCS).as_posix() for path in (*DOCS.rglob("*.md"), *NOTEBOOKS)}
     assert entries(yaml.safe_load((ROOT / "mkdocs.yml").read_text("utf-8"))["nav"]) == pages
+
+
+PROOFS = [*sorted((DOCS / "theory").glob("*.md")), DOCS / "errata.md"]
+
+
+@pytest.mark.parametrize("path", PROOFS, ids=lambda path: path.stem)
+def test_formulas_are_set_and_nothing_of_their_notation_is_left(path):
+    page = SimpleNamespace(file=SimpleNamespace(src_uri=path.relative_to(DOCS).as_posix()))
+    kept = typeset.on_page_markdown(path.read_text("utf-8"), page)
+    assert len(page.formulas) > 5
+    assert "```text" not in kept
+    for formula in page.formulas:
+        text = "".join(ET.fromstring(f"<all>{formula}</all>").itertext())
+        assert not re.search(r"[_^*~']|[<>]=|\\", text), text
+
+
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        ("|xt(t)| <= Dxt/sqrt(Gamma)", "|x˜(t)|≤ Δx˜/Γ"),
+        ("D+ d <= -lambda d + beta |xi|", "D+d≤ −λd+β|ξ|"),
+        ("sum_1<=i<j |d_i xi_k-i|", "∑1≤i<j|diξk−i|"),
+        ("x*' - B(x*) u*", "x∗′−B(x∗)u∗"),
+    ],
+)
+def test_a_formula_keeps_its_letters_and_their_order(written, shown):
+    text = "".join(ET.fromstring(f"<all>{typeset.inline(written)}</all>").itertext())
+    assert text == shown
+    assert "<msub>" in typeset.inline("w_i")
+    assert "<msup>" in typeset.inline("e^(-lambda t)")
 
 
 @pytest.mark.slow

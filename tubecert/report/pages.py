@@ -75,7 +75,7 @@ class ConstantPage:
             _filled(self.meaning),
             f"Unit: {self.unit} (x: state, u: input, d: Riemannian distance)",
             f"In a certificate: result.constants.{self.name}, as [proven below, proven above]",
-            f"Source: {self.equation}; docs/theory.md, docs/equations.md",
+            f"Source: {self.equation}; docs/theory, docs/equations.md",
         ]
         return "\n\n".join(parts)
 
