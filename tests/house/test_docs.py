@@ -113,6 +113,12 @@ def test_the_readme_is_read_once():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 1300
 
 
+def test_the_glossary_has_sixty_nouns_and_each_once():
+    glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    nouns = re.findall(r"^\| (?!noun)([a-z ]+) \|", glossary, re.M)
+    assert len(nouns) == len(set(nouns)) <= 60
+
+
 def test_errata_mentioned_elsewhere_exist():
     errata = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
     headings = " ".join(re.findall(r"^## (.*)$", errata, re.M))
