@@ -19,7 +19,7 @@ Examples:
 
 \b
 A file of a specification may lack all but tubecert, name, system, safe_set and metric. Metrics that follow
-it (.json, .csv, .npz, .mat) are decided for its system in place of its own. docs/synthesis.md has the formats.
+it (.json, .csv, .npz, .mat) are decided for its system in place of its own. docs/verify.md has the formats.
 
 \b
 Exit codes: 0 C1-C3 hold for all of them; 1 one is refuted; 2 invalid input; 4 one could not be decided.

@@ -291,7 +291,7 @@ def _check_symmetry(path: str, matrices: Sequence[Sequence[Sequence[str]]]) -> N
 def _help() -> str:
     return (
         "it holds `coefficients`: W itself where that is constant, else K symmetric matrices with `monomials` or "
-        "`powers`; `rate` beside them; docs/synthesis.md has examples"
+        "`powers`; `rate` beside them; docs/verify.md has examples"
     )
 
 
