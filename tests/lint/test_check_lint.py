@@ -2,6 +2,7 @@
 
 import math
 import re
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 import tubecert
 from tubecert import lint, pipeline
 from tubecert.findings import Finding, Severity
-from tubecert.spec import load, load_text
+from tubecert.spec import canonical, load, load_text
 
 PACKAGE = Path(tubecert.__file__).parent
 ROOT = PACKAGE.parent
@@ -294,6 +295,30 @@ def test_the_equilibrium_near_a_point_is_written_out():
     assert helps == ["nothing is wrong: the proof counts it in; expressions (input: [m*g]) help"]
     [finding] = found(changed(("input: [0]", "input: [1]")))
     assert "write input: [0];" in finding.help  # the point is held, by another input
+
+
+def test_at_auto_is_the_equilibrium_near_a_point_in_exact_numbers():
+    """V6: nobody's trim is exact; the certificate is about the numbers that are found, as if they were written."""
+    auto = TANKS.replace("at: [3.18, 4.96]", "at: auto, near: [3.18, 4.96]")
+    assert not [item for item in found(auto) if item.code == "TC404"]
+    told = canonical(load_text(auto))["trajectory"]
+    (a, b), (u,) = ([Fraction(text) for text in told[key]] for key in ("at", "input"))
+    assert abs(a - Fraction("3.18")) + abs(b - Fraction("4.96")) < Fraction("0.01")
+    assert abs((2 * u) ** 2 - a) + abs((5 * u / 2) ** 2 - b) < Fraction(1, 10**18)
+    written = f"at: [{told['at'][0]}, {told['at'][1]}], input: [{told['input'][0]}]"
+    assert canonical(load_text(TANKS.replace("at: [3.18, 4.96], input: [0.892]", written))) == canonical(
+        load_text(auto)
+    )
+    middle = canonical(load_text(TANKS.replace("at: [3.18, 4.96], input: [0.892]", "at: auto")))
+    assert abs(Fraction(middle["trajectory"]["at"][0]) - 3) < Fraction("0.3")
+    arm = BASE.replace('"-k*p - v"', '"19.62*sin(p)"').replace(
+        "at: [0, 0], input", "at: auto, near: [0.1, 0], input"
+    )
+    held = load_text(
+        arm.replace("initial_state: {at: [0, 0]}", "")
+    ).trajectory  # by its input: no state moves
+    assert [term.expression.fraction for term in held.x] == [Fraction(1, 10), 0]
+    assert abs(float(held.u[0].expression.fraction) + 19.62 * math.sin(0.1)) < 1e-15
 
 
 CAR = """

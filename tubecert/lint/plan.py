@@ -23,10 +23,10 @@ from tubecert.lint.names import turned
 from tubecert.lint.table import paid, table_findings
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.spec import Obstacle, Spec, Vector
+from tubecert.spec.trim import Plant, equilibrium
 
 _SAMPLES = 257
 _ROUNDING = 1e-9
-_STEPS, _LEFT = 20, 1e-13  # of Newton's method, and where it ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,11 +209,13 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
-        near_by = _equilibrium(spec, curve, model)
+        near_by = _equilibrium(spec)
         message = f"|f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)"
         if notable:
             message = f"the point is no equilibrium: {message}"
-            help = f"write {near_by or 'at and input with f(at) + B(at) input = 0'}; {paid(spec)}"
+            exact = f" (at: auto, near: [{', '.join(near(x, 4) for x in curve.x[0])}] is that to 20 digits)"
+            exact = exact if near_by.startswith("at") else ""
+            help = f"write {near_by or 'at and input with f(at) + B(at) input = 0'}{exact}; {paid(spec)}"
         else:
             room = f"{up(100 * worst / bearable, 2)} % of what the tube has room for"
             message = f"the point is an equilibrium up to a rounding: {message}, {room}"
@@ -237,32 +239,15 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
         )
 
 
-def _equilibrium(spec: Spec, curve: Curve, model: ControlAffineModel) -> str:
-    """What to write for the equilibrium near a point, by Newton's method; empty if none is found in the safe set.
-
-    First the inputs alone move, then states as well, by equal shares of the safe set where there is a choice.
-    """
-    from tubecert.expression.matrix import jacobian
-
-    n, names = len(spec.states), (*model.states, *model.inputs)
-    drift = [row[0] for row in model.drift_on_plan()]
-    tape = Tape([*drift, *(slope for row in jacobian(drift, names) for slope in row)], (*names, TIME))
-    low, high = _sides(spec)
-    size = np.concatenate([(high - low) / 2, np.maximum(np.abs(curve.u[0]), 1.0)])
-    for first in (n, 0):
-        z = np.concatenate([curve.x[0], curve.u[0], curve.t])
-        for _ in range(_STEPS):
-            values = tape.run_floats(list(z[:, None]), (1,))[:, 0]
-            missed, slopes = values[:n], values[n:].reshape(n, -1) * size
-            if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(missed))):
-                break
-            if np.all(np.abs(missed) <= _LEFT * np.abs(slopes).max()):
-                found = [near(value + 0.0, 12) for value in np.round(z[:-1] / size, 12) * size]
-                held = f"input: [{', '.join(found[n:])}]"
-                inside = np.all((low <= z[:n]) & (z[:n] <= high))
-                return (held if first else f"at: [{', '.join(found[:n])}], {held}") if inside else ""
-            z[first:-1] += np.linalg.lstsq(slopes[:, first:], -missed)[0] * size[first:]
-    return ""
+def _equilibrium(spec: Spec) -> str:
+    """What to write for the equilibrium near the point that is held; empty if none is found in the safe set."""
+    plan = spec.trajectory
+    x, u = (tuple(term.expression.fraction for term in terms) for terms in (plan.x, plan.u))
+    found = equilibrium(Plant(spec.states, spec.inputs, spec.f, spec.B, spec.safe_set), x, u)
+    if found is None:
+        return ""
+    at, held = (f"[{', '.join(near(nearest(value), 12) for value in each)}]" for each in found)
+    return f"input: {held}" if found[0] == x else f"at: {at}, input: {held}"
 
 
 def _bearable(spec: Spec) -> float:

@@ -12,6 +12,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `names` | the names that expressions may use |
 | `table` | a plan file (CSV): text -> exact knots |
 | `algebra` | exact checks: definiteness, symmetry, rank |
+| `trim` | the equilibrium near a point |
 | `override` | keys that the command line sets, put into the tree |
 | `load` | the file as a section, and what holds between sections |
 | `canonical` | the effective specification as plain data |

@@ -43,6 +43,7 @@ from tubecert.spec.system import (
     read_uncertainty,
     read_units,
 )
+from tubecert.spec.trim import Plant
 from tubecert.spec.tube import (
     ADAPTATION,
     CONDITIONS,
@@ -268,7 +269,13 @@ def _read_named(
     sound, box, metric = FILE.holds(found, entries), found.get("safe_set"), found.pop("metric", None)
     uncertainty = read_uncertainty(entries.get("uncertainty"), machine, names)
     trajectory = entries.get("trajectory")
-    plan = read_trajectory(trajectory, names) if trajectory else None
+    known = drift and f and known_of(f, drift, names)
+    gain = [known_of(B, row, names) for row in inputs] if inputs and B else []
+    sure = tuple(row for row in gain if row is not None)
+    plant = None
+    if known and box and len(sure) == len(names.states):
+        plant = Plant(names.states, names.inputs, known, sure, box)
+    plan = read_trajectory(trajectory, names, plant) if trajectory else None
     start = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
     x0 = start.x0
     if box is not None and not entries.keys() & {*_LOOP}:  # as `load_system` leaves it
@@ -277,8 +284,8 @@ def _read_named(
     plan = completed(plan, x0) if plan else None
     limits = limits_of(entries.get("limits"), machine)
     found |= {
-        "f": drift and f and known_of(f, drift, names),
-        "B": [known_of(B, row, names) for row in inputs] if inputs and B else None,
+        "f": known,
+        "B": sure if len(sure) == len(names.states) else None,
         "units": read_units(system.get("units"), names),
         "uncertainty": uncertainty,
         "trajectory": plan,
@@ -294,7 +301,6 @@ def _read_named(
         return None
     decides = CONDITIONS.sound(CONDITIONS.entries(entries.get("conditions")), names) or {}
     return found | {
-        "B": tuple(found["B"]),
         "drift": drift if names.ranges else (),
         "gained": inputs if is_uncertain(inputs, names) else (),
         "within": start.within,

@@ -16,6 +16,7 @@ from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
 from tubecert.spec.system import Uncertainty, no_uncertainty
 from tubecert.spec.table import COLUMNS, read_table
+from tubecert.spec.trim import Plant, equilibrium
 from tubecert.spec.values import Ends, Interpolation, Matrix, Table, Term, Vector
 
 PlanKind = Literal["equilibrium", "expressions", "csv", "ilqr", "any"]
@@ -220,10 +221,12 @@ class Held:
 
     kind = _kind("equilibrium")
     """Hold a point."""
-    at = entry(keys.constants("states"), "x", needed=True, example=[0, 0])
-    """The point x*, one number per state."""
+    at = entry(keys.or_auto(keys.constants("states")), "x", needed=True, example=[0, 0])
+    """The point x*, one number per state; auto: the equilibrium nearest to `near`, x* and u*, to 20 digits."""
+    near = entry(numbers("states"), "", example=[3.18, 4.96])
+    """With at: auto: the point near which it is, one number per state; the middle of the safe set if left out."""
     input = entry(keys.constants("inputs"), "u", example=[0])
-    """The input u* that holds it, one number per input; 0 if left out."""
+    """The input u* that holds it, one number per input; 0 if left out. With at: auto: about what that is."""
     horizon = _horizon()
     """How long the point is held, in s; needed unless h is free of t or periodic (then the claim is for all time)."""
     afterwards = _afterwards(f"{_AFTER}rest, repeat: the point is held for ever.")
@@ -281,8 +284,8 @@ def trajectory_data(plan: Trajectory, spec: Any) -> dict[str, Any]:
     return PLANS[plan.kind].written(plan, spec) | after
 
 
-def read_trajectory(field: Field, names: Names) -> Trajectory | None:
-    """The plan; what a planner's start is by default is not known yet (see `completed`)."""
+def read_trajectory(field: Field, names: Names, plant: Plant | None) -> Trajectory | None:
+    """The plan; what a planner's start is by default is not known yet (see `completed`); `plant` None: unreadable."""
     choices = " or ".join(PLANS)
     if field.pairs(f"with a kind: {choices}") is None:
         return None
@@ -296,7 +299,11 @@ def read_trajectory(field: Field, names: Names) -> Trajectory | None:
     if kind is None or entries is None:
         return None
     values = PLANS[kind].values(entries, names)
-    more = _table(entries, values, names) if kind == "csv" else {}
+    more: Mapping[str, Any] | None = {}
+    if kind == "csv":
+        more = _table(entries, values, names)
+    elif kind == "equilibrium":
+        more = _trimmed(entries, values, plant)
     if not PLANS[kind].holds(values, entries) or more is None:
         return None
     plan = _made(kind, {**values, **more}, field, names)
@@ -318,11 +325,36 @@ def _table(entries: Mapping[str, Field], values: Mapping[str, Any], names: Names
     return {"table": table, "horizon": last if horizon is None else horizon}
 
 
+def _trimmed(
+    entries: Mapping[str, Field], values: dict[str, Any], plant: Plant | None
+) -> dict[str, Any] | None:
+    """What at: auto stands for; `near` goes with nothing else."""
+    at = entries.get("at")
+    if at is None or values.get("x", at) is not None:
+        if at is not None and "near" in entries:
+            help = "write at: auto, or leave near out"
+            entries["near"].fail(codes.RANGE, "trajectory.near beside a point that is given", help)
+        return {}
+    if plant is None:
+        return None
+    middle = tuple((low + high) / 2 for low, high in plant.box)
+    u = [term.expression.fraction for term in values.get("u", ())]
+    found = equilibrium(plant, values.get("near", middle), tuple(u or [Fraction(0)] * len(plant.inputs)))
+    if found is None:
+        help = "give near: [...], a point beside one, or at and input with f(at) + B(at) input = 0"
+        at.fail(codes.RANGE, "no equilibrium is found there in the safe set", help)
+        return None
+    return {
+        key: tuple(keys.constant_term(at, own) for own in each) for key, each in zip("xu", found, strict=True)
+    }
+
+
 def _made(kind: PlanKind, values: dict[str, Any], field: Field, names: Names) -> Trajectory:
     horizon = values.pop("horizon", None)
     match kind:
         case "equilibrium":
-            values = {"u": tuple(keys.constant_term(field, Fraction(0)) for _ in names.inputs)} | values
+            none = tuple(keys.constant_term(field, Fraction(0)) for _ in names.inputs)
+            values = {"x": values["x"], "u": values.get("u", none)}
         case "csv":
             values = {"table": values["table"]}
         case "ilqr":
