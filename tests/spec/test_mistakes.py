@@ -9,10 +9,10 @@ import pytest
 from mistakes import GOOD, MISTAKES, ON_A_MACHINE
 
 from tubecert.errors import TubecertError
-from tubecert.expression import Lookup
+from tubecert.expression import Lookup, elsewhere
 from tubecert.findings import Finding
 from tubecert.pipeline import inspect
-from tubecert.spec import instead, load_text
+from tubecert.spec import load_text
 
 JARGON = re.compile(r"value error|pydantic|NoneType|Traceback|instance of|expected type", re.IGNORECASE)
 
@@ -70,4 +70,4 @@ def test_a_delay_may_use_a_parameter_whose_name_is_about_samples() -> None:
 
 def test_the_sections_that_may_be_indented_too_far_are_those_of_the_schema():
     schema = json.loads(resources.files("tubecert.schemas").joinpath("spec.schema.json").read_text("utf-8"))
-    assert set(schema["properties"]) - {"tubecert"} == instead._SECTIONS
+    assert set(schema["properties"]) - {"tubecert"} == elsewhere("sections").keys()

@@ -10,13 +10,14 @@ yes.
 | `lookup` | functions given by tables |
 | `text` | graph -> text in the grammar of the specification |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
-| `meant` | which known word a typing error stands for |
+| `meant`, `elsewhere` | which known word a typing error, or a word of other formats and languages, stands for |
 | `number` | text -> rational number, pi and degrees rounded |
 | `owed` | text with the obligations that folding dropped |
 | `zero` | proves that an expression vanishes identically |
 """
 
 from tubecert.expression.calculus import derivative, derivatives, free_symbols, rebuild, substitute
+from tubecert.expression.elsewhere import elsewhere
 from tubecert.expression.graph import (
     ONE,
     PI,
@@ -53,49 +54,10 @@ from tubecert.expression.text import longest_text, number_text, to_text
 from tubecert.expression.zero import is_zero
 
 __all__ = [
-    "FUNCTIONS",
-    "MAX_LENGTH",
-    "MAX_NAME_LENGTH",
-    "MAX_NUMBER_EXPONENT",
-    "ONE",
-    "PI",
-    "RESERVED",
-    "UNKNOWN",
-    "ZERO",
-    "Expression",
-    "ExpressionError",
-    "Lookup",
-    "Obligation",
-    "Parsed",
-    "Side",
-    "as_expression",
-    "coefficient",
-    "constant",
-    "cos",
-    "derivative",
-    "derivatives",
-    "exp",
-    "free_symbols",
-    "full_text",
-    "is_name",
-    "is_zero",
-    "longest_text",
-    "near",
-    "norm",
-    "number_text",
-    "parse",
-    "parse_constant",
-    "parse_number",
-    "power",
-    "rates_of",
-    "rebuild",
-    "root_above",
-    "sin",
-    "sqrt",
-    "substitute",
-    "suggestion",
-    "symbol",
-    "tan",
-    "to_text",
-    "topological",
-]
+    "FUNCTIONS", "MAX_LENGTH", "MAX_NAME_LENGTH", "MAX_NUMBER_EXPONENT", "ONE", "PI", "RESERVED", "UNKNOWN",
+    "ZERO", "Expression", "ExpressionError", "Lookup", "Obligation", "Parsed", "Side", "as_expression",
+    "coefficient", "constant", "cos", "derivative", "derivatives", "elsewhere", "exp", "free_symbols",
+    "full_text", "is_name", "is_zero", "longest_text", "near", "norm", "number_text", "parse",
+    "parse_constant", "parse_number", "power", "rates_of", "rebuild", "root_above", "sin", "sqrt",
+    "substitute", "suggestion", "symbol", "tan", "to_text", "topological",
+]  # fmt: skip

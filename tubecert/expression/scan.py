@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from tubecert.expression.elsewhere import ELSEWHERE
+from tubecert.expression.elsewhere import elsewhere
 from tubecert.expression.graph import FUNCTIONS as SMOOTH
 from tubecert.expression.meant import mistyped
 from tubecert.expression.measures import HAS_NONE, UNITS, instead_of
@@ -74,38 +74,6 @@ _TOKEN = re.compile(
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
     r"|(?P<operator>\*\*|[-+*/(),])"
 )
-# Longest first: what is no part of the grammar, and what to write instead.
-_FOREIGN = {
-    "//": "there is no floor division; write / for a quotient",
-    "<<": "there are no bit operations",
-    ">>": "there are no bit operations",
-    ":=": "an expression assigns nothing",
-    "==": "an expression compares nothing; write one side only",
-    "!=": "an expression compares nothing; write one side only",
-    "<": "an expression compares nothing and has no cases; write one smooth expression, e.g. with tanh",
-    ">": "an expression compares nothing and has no cases; write one smooth expression, e.g. with tanh",
-    "=": "an expression assigns nothing; write the right-hand side only",
-    "^": "write ** for a power",
-    "%": "5 % is 0.05; there is no remainder operation",
-    "@": "write products entry by entry",
-    "&": "there are no bit operations",
-    "|": "write abs(x) for an absolute value, in h only; elsewhere sqrt(x**2 + 0.01) may serve",
-    "~": "there are no bit operations",
-    "!": "there is no factorial",
-    "[": "an entry is one scalar expression: group with parentheses; arguments stand without brackets: norm(x, y)",
-    "]": "an entry is one scalar expression; group with parentheses",
-    "{": "group with parentheses",
-    "}": "group with parentheses",
-    "'": "an expression contains no quotes; f lists the derivatives, an entry names none",
-    '"': "an expression contains no text in quotes",
-    ";": "write one expression",
-    ":": "write one expression",
-    "#": "an expression contains no comment",
-    "\\": "write one expression, on as many lines as you like, without backslashes",
-    "`": "an expression contains no quotes",
-    "?": "remove it",
-    "$": "remove it",
-}
 _EQUATION = re.compile(r"[:=!<>]?=")
 _IN_TIME = re.compile(r"\b([A-Za-z_]\w*)(\s*\(\s*t\s*(?:([-+])[^()]*)?\))", re.ASCII)
 _LOOKALIKES = {
@@ -229,7 +197,7 @@ def _glued(token: _Token, tail: str) -> ExpressionError:
 def _foreign(text: str, position: int) -> ExpressionError:
     """The error for a character that is no part of the grammar."""
     for width in (2, 1):
-        if advice := _FOREIGN.get(text[position : position + width]):
+        if advice := elsewhere("signs").get(text[position : position + width]):
             return ExpressionError(
                 f"{text[position : position + width]} is not allowed in an expression",
                 help=advice,
@@ -352,8 +320,8 @@ class _Walk:
     def _help(self, name: str) -> str:
         """What was meant, if that is plain; a function only for its own letters in another order or case."""
         words = self.vocabulary
-        if name in ELSEWHERE:
-            return ELSEWHERE[name]
+        if said := elsewhere("functions").get(name):
+            return said
         functions = [*(f for f in FUNCTIONS if words.kinks or f not in KINKED), *sorted(words.tables)]
         meant = [f for f in functions if sorted(f) == sorted(name.lower())] or mistyped(
             name, [*words.symbols, *words.tables, "pi"]

@@ -18,16 +18,16 @@ from tubecert.expression import (
     Expression,
     ExpressionError,
     Side,
+    elsewhere,
     longest_text,
     parse_constant,
     parse_number,
-    suggestion,
     topological,
 )
 from tubecert.findings import MOST, Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
-from tubecert.spec.instead import EXAMPLES, GONE, NO_NUMBER, OTHER_WORDS, glued, of_key, of_value
+from tubecert.spec.instead import example_of, glued, of_key, of_value, of_word
 from tubecert.spec.scope import MODERATE, Parameters, Scope, out_of_range
 from tubecert.spec.source import Mark, Source
 from tubecert.spec.values import Matrix, Term, TermMatrix
@@ -120,7 +120,7 @@ class Field:
         missing = [key for key in required if key not in fields and key not in meant]
         if missing:
             message = f"{self.path or self.reader.document} lacks {', '.join(missing)}"
-            help = "add " + ", ".join(f"{key}: {EXAMPLES.get(key, '...')}" for key in missing)
+            help = f"add {', '.join(map(example_of, missing))}"
             if self.key is None:
                 self.fail(codes.MISSING_KEY, message, help)
             else:
@@ -173,10 +173,9 @@ class Field:
         word = self.text(f"one of {', '.join(choices)}")
         if word is None or word in choices:
             return word
-        other = OTHER_WORDS.get(word.lower())
-        meant = f"here it is {other}; " if other in choices else ""
-        help = GONE.get(word) or meant + suggestion(word, choices, what="choices")
-        self.fail(codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", help)
+        self.fail(
+            codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", of_word(word, choices)
+        )
         return None
 
     def number(self, parameters: Parameters, *, side: Side = "nearest", **bounds: int) -> Fraction | None:
@@ -187,7 +186,7 @@ class Field:
         try:
             value = parse_number(self.node.text, parameters, side)
         except ExpressionError as error:
-            error.help = NO_NUMBER.get(self.node.text, error.help)
+            error.help = elsewhere("numbers").get(self.node.text, error.help)
             self._expression_error(error, codes.NUMBER)
             return None
         if extreme := out_of_range(value):
