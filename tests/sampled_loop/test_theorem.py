@@ -19,7 +19,7 @@ from tubecert.sampled_loop.cells import largest_jump, steepness
 from tubecert.sampled_loop.matrices import product
 from tubecert.sampled_loop.record import Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders
-from tubecert.sampled_loop.responses import Dynamics, Kernel, Responses
+from tubecert.sampled_loop.responses import Acting, Dynamics, Responses
 from tubecert.sampled_loop.setting import Controller, Loop
 from tubecert.sampled_loop.theorem import Boxes, Inequalities, check
 from tubecert.spec import Knots, load_text
@@ -264,8 +264,8 @@ def test_what_is_left(sections, W, U, size, through):
 def test_what_is_left_acts_as_a_wind_does_through_its_columns():
     """x' = v, v' = u: of a defect of v nothing but half of Ts^2 comes to x within a sample."""
     loop = loop_of(**DOUBLE, A=[[0, 1], [0, 0]], B=[[0], [3]])
-    direct = Responses(loop, controller_of([[0, 0]]), lags=1, pieces=1, panels=16).direct[-1]
-    close(direct.rho, [[TS, TS**2 / 2, 3 * TS**2 / 2], [0, TS, 3 * TS]])
+    own = Responses(loop, controller_of([[0, 0]]), lags=1, pieces=1, panels=16)
+    close(own.direct[-1][:, own.passing - 3 : own.passing], [[TS, TS**2 / 2, 3 * TS**2 / 2], [0, TS, 3 * TS]])
 
 
 def test_rounding_of_singles():
@@ -303,7 +303,7 @@ def test_a_sample_is_that_of_the_plant(whole, rest):
         rng.normal(size=(1, 2)), rng.normal(size=(3, 3)), rng.normal(size=(3, 2)), rng.normal(size=(1, 3))
     )
     own = Dynamics(loop, c)
-    (core, eta), enters, nodes = own.step(), own.discrete(), 10
+    step, nodes = own.step(), 10
     e, zeta, past, w, n = (
         rng.normal(size=2),
         rng.normal(size=3),
@@ -319,51 +319,42 @@ def test_a_sample_is_that_of_the_plant(whole, rest):
     full = expm(np.block([[A, np.hstack([B, E])], [np.zeros((2, 4))]]) * h)
     for k in range(nodes):
         acting = queue[whole] if k * h >= float(rest) - 1e-9 else queue[whole + 1]
-        flow, slope = (
-            own.flow(loop.sample_time * k / nodes),
-            own.slope(loop.sample_time * (2 * k + 1) / (2 * nodes)),
-        )
-        at = flow.core.mid @ xi + flow.eta.mid[:, 0] * w + flow.noise.mid @ n + flow.rounding.mid @ du
-        assert np.allclose(at, e, rtol=1e-9)
+        now = np.concatenate([xi, [w], n, du, dz])
+        assert np.allclose(own.error(loop.sample_time * k / nodes).mid @ now, e, rtol=1e-9)
+        moved = own.slope(loop.sample_time * (2 * k + 1) / (2 * nodes)).mid @ now
         middle = expm(np.block([[A, np.hstack([B, E])], [np.zeros((2, 4))]]) * h / 2) @ np.array(
             [*e, acting, w]
         )
-        moved = slope.core.mid @ xi + slope.eta.mid[:, 0] * w + slope.noise.mid @ n + slope.rounding.mid @ du
         assert np.allclose(moved, A @ middle[:2] + B[:, 0] * acting + E[:, 0] * w, rtol=1e-9)
         e = (full @ np.array([*e, acting, w]))[:2]
-    after = np.concatenate([e, c.F @ zeta + c.G @ (xi[:2] + n) + dz, queue[: whole + 1]])
-    found = core.mid @ xi + eta.mid[:, 0] * w + enters.mid @ np.concatenate([n, du, dz])
-    assert np.allclose(found, after, rtol=1e-9)
-    assert max(own.rad.max() for own in (core, eta, enters)) < 1e-12
+    after = np.concatenate([e, c.F @ zeta + c.G @ (xi[:2] + n) + dz, queue[: whole + 1], [w]])
+    assert np.allclose(step.mid @ now, after, rtol=1e-9)
+    assert step.rad.max() < 1e-12
 
 
 @pytest.mark.parametrize("length", [False, True])
 def test_integrals_of_kernels(length):
+    """Of a wind, of rho, of h that jumps and of its rate, through rows of e and of eta."""
     rng = np.random.default_rng(3)
-    A, K, rows, plus = (
-        rng.normal(size=(2, 2)) * 3,
-        rng.normal(size=(2, 3)),
-        rng.normal(size=(4, 2)),
-        rng.normal(size=(4, 3)),
+    A, E, rows, plus = rng.normal(size=(2, 2)) * 3, rng.normal(size=(2, 3)), rng.normal(size=(4, 2)), 0.3
+    bound = "2" if length else "[1, 2, 3]"
+    loop = loop_of(
+        **DOUBLE,
+        uncertainty="{h: ['0.1*sin(t)']}",
+        disturbance=f"{{E: [['0', '0', '0'], ['1', '1', '1']], bound: {bound}}}",
+        A=A,
+        B=[[0], [1]],
+        E=E,
     )
-    loop = loop_of(**DOUBLE, A=A, B=[[0], [1]])
-    ends = [loop.sample_time * k / 16 for k in range(17)]
-    own = Responses(loop, controller_of([[0, 0]]), lags=1, pieces=1, panels=1).dynamics.exponential
+    dynamics = Dynamics(loop, controller_of([[0, 0]]))
     s = (np.arange(200) + 0.5) / 200 * TS
     phi = np.array([expm(A * t) for t in s])
     whole = np.array([expm(np.block([[A, np.eye(2)], [np.zeros((2, 4))]]) * t)[:2, 2:] for t in s])
-    for integral, each, more in ((False, phi, None), (True, whole, plus)):
-        value = rows @ each @ K + (0 if more is None else more)
-        size = np.linalg.norm(value, axis=-1, keepdims=True) if length else np.abs(value)
-        close(
-            Kernel(own, K, ends, integral=integral).of(rows, more, length=length),
-            size.mean(axis=0) * TS * (1 - 1e-3),
-            0.02,
-        )
-    coarse = Kernel(own, K, [ends[0], ends[-1]])  # one chord, and how far it may be off
-    assert (
-        coarse.of(rows, length=length) >= size_of(rows @ phi @ K, length).mean(axis=0) * TS * (1 - 1e-3)
-    ).all()
+    wind = size_of(rows @ phi @ E, length) @ ([2.0] if length else [1.0, 2.0, 3.0])
+    others = np.concatenate([rows @ phi @ loop.R, rows @ phi @ loop.B, rows @ whole @ loop.B + plus], axis=2)
+    exact = np.concatenate([wind[:, :, None], np.abs(others)], axis=2).mean(axis=0) * TS * (1 - 1e-3)
+    close(Acting(dynamics, loop.sample_time, 16).of(rows, np.full((4, 1), plus)), exact, 0.02)
+    assert (Acting(dynamics, loop.sample_time, 1).of(rows, np.full((4, 1), plus)) >= exact).all()
 
 
 def size_of(value, length):
@@ -401,31 +392,30 @@ def test_what_the_rows_miss_is_counted(monkeypatch, at_once):
     monkeypatch.setattr(responses, "_AT_ONCE", at_once)
     loop = loop_of(**DOUBLE, A=[[0.3, 1], [-0.7, 0.1]], B=[[0], [1]], uncertainty="{h: ['0.1*sin(t)']}")
     own = Responses(loop, controller_of([[-3.3, -4.7]]), lags=9, pieces=1, panels=1)
-    core, eta = (np.vectorize(Fraction)(part.mid) for part in own.dynamics.step())
-    first = own.dynamics.outputs(own.nodes)
-    rows, slow = np.vectorize(Fraction)(own.rows), np.vectorize(Fraction)(own.eta)
-    missed = sum(abs(a @ core - b) for a, b in pairwise(rows))
-    missed_slow = sum(abs(a @ eta + b - c) for a, (b, c) in zip(rows, pairwise(slow), strict=False))
+    step = np.vectorize(Fraction)(own.dynamics.step().mid[:, : own.dynamics.width])
+    first, rows = own.dynamics.error(own.nodes[-1]), np.vectorize(Fraction)(own.rows)
+    missed = sum(abs(a @ step - b) for a, b in pairwise(rows))
+    xi = own.now[:, own.passing : own.passing + own.dynamics.width]
     assert missed.max() > 0
-    assert missed_slow.max() > 0
-    assert (missed + np.vectorize(Fraction)(first.core.rad) <= own.now.core).all()
-    assert (missed_slow + np.vectorize(Fraction)(first.eta.rad) <= own.now.eta).all()
+    assert missed[:, -1].max() > 0
+    assert (missed <= xi).all()
+    assert (missed[2:4] + np.vectorize(Fraction)(first.rad[:, : own.dynamics.width]) <= xi[2:4]).all()
 
 
 def test_how_far_from_the_chord():
     """x' = v, v' = u, whose input is held: x is a parabola, Ts^2/8 |delta| off; as all of xi and n may have it."""
     loop = loop_of(**DOUBLE, A=[[0, 1], [0, 0]], B=[[0], [1]], uncertainty="{h: ['0.1*sin(t)']}")
-    piece = Responses(loop, controller_of([[-3, -4]]), lags=1, pieces=1, panels=1).pieces[0]
+    own = Responses(loop, controller_of([[-3, -4]]), lags=1, pieces=1, panels=1)
     arc = TS**2 / 8
-    close(piece.core, [[3 * arc, 4 * arc, 0], [0, 0, 0]])
-    close(piece.eta, [[arc], [0]])
-    close(piece.rounding, [[3 * arc, 4 * arc, arc], [0, 0, 0]])
+    close(own.pieces[0][:, own.passing :][:, :4], [[3 * arc, 4 * arc, 0, arc], [0, 0, 0, 0]])
+    close(own.pieces[0][:, 2:5], [[3 * arc, 4 * arc, arc], [0, 0, 0]])
     late = loop_of(
         **{**DOUBLE, "hardware": "{sample_time: 0.1, delay: 0.04}"}, A=[[0, 1], [0, 0]], B=[[0], [1]]
     )
-    first, last = Responses(late, controller_of([[-3, -4]]), lags=1, pieces=1, panels=1).pieces
-    close(first.core, [[0, 0, 0.04**2 / 8], [0, 0, 0]])
-    close(last.core, [[3 * 0.06**2 / 8, 4 * 0.06**2 / 8, 0], [0, 0, 0]])
+    own = Responses(late, controller_of([[-3, -4]]), lags=1, pieces=1, panels=1)
+    first, last = own.pieces[:, :, own.passing :][:, :, :3]
+    close(first, [[0, 0, 0.04**2 / 8], [0, 0, 0]])
+    close(last, [[3 * 0.06**2 / 8, 4 * 0.06**2 / 8, 0], [0, 0, 0]])
 
 
 def test_chords_meet_the_box_and_noise():
@@ -433,12 +423,9 @@ def test_chords_meet_the_box_and_noise():
     loop = loop_of(**{**DOUBLE, "hardware": machine}, A=[[0, 1], [0, 0]], B=[[0], [1]])
     own = asked(loop, controller_of([[-3, -4]]), pieces=1)
     boxes = Boxes(np.array([[0.5, 0.7]]), np.array([[9.0]]), np.zeros((1, 0)))
-    (phase,), _ = own.phases(boxes)
-    off = np.array([0.1, 0.2, 0.4])
-    close(
-        phase._replace(rounding=off).met(own.responses.pieces[0]),
-        [(3 * 0.61 + 4 * 0.92 + 0.4) * TS**2 / 8, 1e-30],
-    )
+    size, noise = own.phases(boxes)[1][0], 0.01 * 3 + 0.02 * 4
+    size[2:5] = 0.1, 0.2, 0.4
+    close(own.responses.pieces[0] @ size, [(3 * 0.6 + 4 * 0.9 + 0.4 + noise) * TS**2 / 8, 1e-30])
 
 
 def test_a_stage_begins_before_the_plan_ends():
@@ -494,17 +481,20 @@ def test_what_was_sent_in_a_stage_is_met_in_the_next():
         )
         assert found.W[2, 0] >= 1 - exp(-1) - exp(-2)
     W = np.array([[1.0], [0.4], [0.6]])
-    phases, _ = asked(loop, controller_of([[-1]]), starts=(0, 4, 20)).phases(Boxes(W, W, np.zeros((3, 0))))
-    assert [(own.start, own.core[0], own.core[1]) for own in phases] == [
-        (0, 1, 1), (4, 0.4, 1), (6, 0.4, 0.4), (20, 0.6, 0.6), (22, 0.6, 0.6)
-    ]  # fmt: skip
+    own = asked(loop, controller_of([[-1]]), starts=(0, 4, 20))
+    starts, sizes, _ = own.phases(Boxes(W, W, np.zeros((3, 0))))
+    assert starts == [0, 4, 6, 20, 22]
+    xi = sizes[:, own.responses.passing :][:, :2]
+    assert xi.tolist() == [[1, 1], [0.4, 1], [0.4, 0.4], [0.6, 0.6], [0.6, 0.6]]
 
 
 def test_a_command_acts_in_its_own_stage():
     """Without delay: the first of a stage with larger ones acts at once."""
     W, U = np.array([[1.0], [1.0]]), np.array([[0.4], [1.0]])
-    phases, _ = asked(loop_of(), starts=(0, 4)).phases(Boxes(W, U, np.zeros((2, 0))))
-    assert [(own.start, own.core[1]) for own in phases] == [(0, 0.4), (4, 1), (5, 1)]
+    own = asked(loop_of(), starts=(0, 4))
+    starts, sizes, _ = own.phases(Boxes(W, U, np.zeros((2, 0))))
+    assert starts == [0, 4, 5]
+    assert sizes[:, own.responses.passing + 1].tolist() == [0.4, 1, 1]
 
 
 @pytest.mark.parametrize(

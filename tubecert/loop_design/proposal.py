@@ -99,8 +99,9 @@ def _in_stages(found: Inequalities) -> Inequalities | None:
 
 def _lags(loop: Loop, controller: Controller) -> int:
     """After how many samples nothing is left of xi; all samples of a plan that ends before."""
-    step, _ = Dynamics(loop, controller).step()
-    slowest = float(np.max(np.abs(np.linalg.eigvals(step.mid)), initial=0.0))
+    own = Dynamics(loop, controller)
+    core = own.width - loop.H.shape[1]
+    slowest = float(np.max(np.abs(np.linalg.eigvals(own.step().mid[:core, :core])), initial=0.0))
     most = MOST_LAGS if loop.samples is None else max(1, loop.samples)
     if slowest >= 1:
         return min(most, MOST_LAGS)

@@ -22,7 +22,7 @@ def explain(inequalities: Inequalities, stages: Sequence[Stage], evaluations: in
     boxes = Boxes.of(stages, model, above=True)
     with np.errstate(all="ignore"):
         first, last = (_causes(inequalities, boxes, stage) for stage in (0, len(stages) - 1))
-    n, sizes = len(model.states), inequalities.phases(boxes)[1]
+    n, sizes = len(model.states), inequalities.phases(boxes)[2]
     constants = {"eta_size": sizes.size, "eta_rate": sizes.rate, "eta_first": sizes.first}
     return replace(
         _points(inequalities.loop.plan),
@@ -36,22 +36,21 @@ def explain(inequalities: Inequalities, stages: Sequence[Stage], evaluations: in
 
 def _causes(inequalities: Inequalities, boxes: Boxes, stage: int) -> list[Shares]:
     """What fills every e_i, then every delta_j and zeta, at the worst sample of a stage."""
-    own, loop = inequalities.responses, inequalities.loop
-    n, sizes = loop.states, inequalities.phases(boxes)[1]
-    b, direct, spread = inequalities.terms(boxes)
-    last, k = n * (len(own.nodes) - 1), np.arange(len(b))  # rows of e at the end of a sample, delta, zeta
-    lag = np.minimum(k, own.lags)
-    held, within = np.concatenate([np.zeros(n), inequalities.remainders.held]), own.direct[-1]
+    own, loop, n = inequalities.responses, inequalities.loop, inequalities.loop.states
+    (b, direct, spread), eta = inequalities.terms(boxes), inequalities.phases(boxes)[2]
+    last, lag = n * (len(own.nodes) - 1), np.minimum(np.arange(len(b)), own.lags)
+    held = np.zeros(own.passing)
+    held[own.passing - loop.inputs :] = inequalities.remainders.held
     during = slice(inequalities.starts[stage], [*inequalities.starts, len(b)][stage + 1])
-    slow, start = inequalities.slow(sizes), inequalities.first(k)
-    parts = np.stack([own.now.noise + own.noise[lag], total(own.rho, held)[lag], slow, own.wind[lag], start])
-    parts, whole = parts[:, during, last:], b[during, last:].copy()
-    parts[1:4, :, :n] += np.stack([total(within.rho, held), total(within.rate, sizes.rate), within.wind])[
-        :, None
-    ]
+    noise, wind = own.now[:, 0] + own.past[lag, :, 0], own.past[lag, :, 1]
+    slow, start = inequalities.slow(eta), inequalities.first(np.arange(len(b)))
+    parts = np.stack([noise, total(own.past, held)[lag], slow, wind, start])[:, during, last:]
+    within, whole = own.direct[-1], b[during, last:].copy()  # of e at the end of a sample, delta, zeta
+    rates = within[:, within.shape[1] - len(eta.rate) :]
+    acted = total(within[:, : own.passing], held), total(rates, eta.rate), within[:, 1]
+    parts[1:4, :, :n] += np.stack(acted)[:, None]
     whole[:, :n] += direct[during, -1] + np.max(spread[during], axis=1)
-    outputs = np.arange(whole.shape[1])
-    found = parts[:, np.argmax(whole, axis=0), outputs]
+    found = parts[:, np.argmax(whole, axis=0), np.arange(whole.shape[1])]
     rest = np.maximum(whole.max(axis=0) - found.sum(axis=0), 0.0)
     names = [item.name for item in fields(Shares)]
     return [Shares(**dict(zip(names, own, strict=True))) for own in np.vstack([found, rest]).T.tolist()]

@@ -29,7 +29,7 @@ from tubecert.sampled_loop.matrices import SUMMED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
 from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders, Sizes
-from tubecert.sampled_loop.responses import Counts, Responses
+from tubecert.sampled_loop.responses import Responses
 from tubecert.sampled_loop.setting import PLAN_ROUNDING, ROUNDING, Controller, Loop
 from tubecert.trajectory.family import Family
 from tubecert.verdict import Verdict
@@ -63,22 +63,6 @@ class Boxes(NamedTuple):
         )
 
 
-class Phase(NamedTuple):
-    """Samples from `start` on with one stage and the same commands acting: sizes of all that `Counts` counts."""
-
-    start: int
-    core: Array
-    eta: Array
-    rounding: Array
-    rho: Array
-    rate: Array
-
-    def met(self, counts: Counts) -> Array:
-        """What all signals do to outputs, (..,)."""
-        pairs = zip(counts[2:], self[1:], strict=True)
-        return np.asarray(sum((total(own, size) for own, size in pairs), counts.noise + counts.wind) * SUMMED)
-
-
 @dataclass(frozen=True, eq=False)
 class Inequalities:
     """All b_o(k) of one loop, controller and recipe, for any tube whose stages begin at samples `starts`.
@@ -104,7 +88,7 @@ class Inequalities:
     def about(self, loop: Loop, controller: Controller, recipe: Recipe, starts: Sequence[int]) -> bool:
         """Whether they are those of a loop and its controller, for a recipe and stages."""
         own, made = self.responses, (loop, loop, controller, controller, recipe, recipe.lags, tuple(starts))
-        whose = self.loop, own.loop, self.controller, own.dynamics.controller
+        whose = self.loop, own.loop, self.controller, own.controller
         return (*whose, self.recipe, own.lags, self.starts) == made
 
     @property
@@ -132,43 +116,43 @@ class Inequalities:
 
     def terms(self, boxes: Boxes) -> tuple[Array, Array, Array]:
         """b of every row (K, R); direct terms at every node (K, nodes, n); what pieces add (K, pieces, n)."""
-        own = self.responses
-        (phases, sizes), off = self.phases(boxes), self._rounding(boxes)
-        k = np.arange(self.last + 1)
-        lag = np.minimum(k, own.lags)
-        boxes_of_xi = np.array([phase.core for phase in phases])
-        begins = np.pad(self.loop.start.reach, (0, boxes_of_xi.shape[1] - self.loop.states))  # 0 at boot
-        widest = phases[0]._replace(core=np.maximum(boxes_of_xi.max(axis=0), begins))
-        constant = own.noise + own.wind + total(own.rounding, off)
-        b = widest.met(own.now) + constant[lag] + self.slow(sizes) + self.first(k) + self._tail(phases, k)
-        starts = [phase.start for phase in phases]
+        own, k = self.responses, np.arange(self.last + 1)
+        (starts, sizes, slow), lag = self.phases(boxes), np.minimum(k, own.lags)
+        widest, e = sizes.max(axis=0), slice(own.passing, own.passing + self.loop.states)
+        widest[e] = np.maximum(widest[e], self.loop.start.reach)  # zeta and v are 0 at boot
+        b = total(own.now, widest) + self.slow(slow) + self.first(k)
         slack = 8 * (own.lags + 8) * UNIT + 4 * (SUMMED - 1)  # a difference of two sums from above
-        for phase, end in zip(phases, [*starts[1:], self.last + 2], strict=True):
-            answers = total(own.rho, phase.rho)
-            newer, older = np.clip(k - phase.start, 0, lag), np.clip(k - end, 0, lag)
+        for start, end, size in zip(starts, [*starts[1:], self.last + 2], sizes, strict=True):
+            answers = total(own.past, size[: own.passing])
+            newer, older = np.clip(k - start, 0, lag), np.clip(k - end, 0, lag)
             b += answers[newer] - answers[older] + slack * answers[newer]
-        index = np.searchsorted(starts, k, side="right") - 1
+        phase = np.searchsorted(starts, k, side="right") - 1
+        core = slice(
+            own.passing, own.passing + own.rows.shape[2] - own.eta.shape[2]
+        )  # eta stands with its cut
+        late = total(np.abs(own.rows[-1, :, : core.stop - core.start]), sizes[:, core].T).T
+        b[own.lags + 1 :] += late[phase[1 : max(1, len(k) - own.lags)]]  # |r_L| Xi of the sample L before
         direct, spread = (
-            np.array([[phase.met(counts) for counts in each] for phase in phases])[index]
-            for each in (own.direct, own.pieces)
+            np.moveaxis(total(each, sizes.T), -1, 0)[phase] for each in (own.direct, own.pieces)
         )
         return b * SUMMED, direct, spread
 
-    def phases(self, boxes: Boxes) -> tuple[list[Phase], Sizes]:
-        """The parts of time in which the same stage lasts and commands of the same stages act."""
-        q, rounding = self.loop.whole, self._rounding(boxes)[: self.loop.states + self.loop.inputs]
+    def phases(self, boxes: Boxes) -> tuple[list[int], Array, Sizes]:
+        """Parts of time in which one stage lasts and commands of the same stages act: first samples, (g,).
+
+        With all that `Responses` count in each of them, (g, ..), and eta.
+        """
+        q, off = self.loop.whole, self._rounding(boxes)
         starts = sorted({0, *self.starts, *(k + q + 1 for k in self.starts[1:])})
         ends = [*starts[1:], starts[-1] + 1]
         of = np.searchsorted(self.starts, np.arange(starts[-1] + 2), side="right") - 1
-        sizes = self.remainders.sizes(boxes.W.max(axis=0))
-        found = []
+        eta, found = self.remainders.sizes(boxes.W.max(axis=0)), []
         for start, end in zip(starts, ends, strict=True):
             acting = boxes.U[of[max(0, start - q - 1)] : of[end - 1] + 1].max(axis=0)
             W, Z = boxes.W[of[start]], boxes.Z[of[start]]
-            rho = self.remainders.rho(W, acting, sizes.size)
-            core = np.concatenate([W, Z, np.tile(acting, q + 1)])
-            found.append(Phase(start, core, sizes.size, rounding, rho, sizes.rate))
-        return found, sizes
+            rho, v = self.remainders.rho(W, acting, eta.size), np.tile(acting, q + 1)
+            found.append(np.concatenate([np.ones(2), off, rho, W, Z, v, eta.size, eta.rate]))
+        return starts, np.array(found), eta
 
     def _rounding(self, boxes: Boxes) -> Array:
         """r_y (n,), r_u (m,), r_z (z,): what the controller's own arithmetic is off by, of every stage (G9)."""
@@ -218,16 +202,9 @@ class Inequalities:
         known += size @ (start.known.rad[:, 0] + start.box) + 64 * UNIT * (size @ start.known.magnitude[:, 0])
         if start.length:
             known += np.sqrt(np.sum(size * size, axis=-1)) * start.length
-        found = np.zeros((len(k), own.count))
+        found = np.zeros((len(k), own.rows.shape[1]))
         found[: len(early)] = known * SUMMED
         return found
-
-    def _tail(self, phases: Sequence[Phase], k: _INDEX) -> Array:
-        """|r_L| Xi of the sample L before, for k > L; eta stands with its cut."""
-        own = self.responses
-        boxes = np.array([total(np.abs(own.rows[-1]), phase.core) for phase in phases])
-        index = np.searchsorted([phase.start for phase in phases], k - own.lags, side="right") - 1
-        return np.where(k[:, None] > own.lags, boxes[index], 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -48,21 +48,22 @@ def kernels_of(setting: Setting, lags: int) -> Kernels:
 
 def _everywhere(setting: Setting, lags: int) -> Kernels:
     """Of the states at every node but the first, then of the inputs."""
-    own, loop, c = Dynamics(setting.loop, setting.tables), setting.loop, setting.tables
-    (n, m), P = loop.B.shape, len(setting.lengths)
-    flows = [own.flow(s) for s in setting.nodes[1:]]
-    AA, NN = own.step()[0].mid, own.discrete().mid[:, :n]
-    rows = np.empty((lags, P * n + m, len(AA)))
-    delta = np.pad(np.hstack([c.N, c.M]), [(0, 0), (0, m * (own.q + 1))])
-    rows[0] = np.vstack([*(flow.core.mid for flow in flows), delta])
+    own, loop = Dynamics(setting.loop, setting.tables), setting.loop
+    (n, m), P, core = loop.B.shape, len(setting.lengths), own.width - loop.H.shape[1]
+    first = np.vstack([*(own.error(s).mid for s in setting.nodes[1:]), own.sent[0]])
+    step, heard = own.step().mid[:core], slice(own.width, own.width + n)
+    AA, NN = step[:, :core], step[:, heard]
+    rows = np.empty((lags, len(first), core))
+    rows[0] = first[:, :core]
     for i in range(1, lags):
         rows[i] = rows[i - 1] @ AA
     parts = np.stack([_parts(own, setting, s) for s in setting.nodes[1:]])
     now = np.concatenate([np.swapaxes(parts, 1, 2).reshape(P * n, P, n), np.zeros((m, P, n))])
     push = np.concatenate([now[None], np.einsum("lfi,pij->lfpj", rows[:-1, :, :n], parts[-1])])
-    noise = np.vstack([*(flow.noise.mid for flow in flows), c.N])
     slow = push.sum(axis=2) @ np.hstack([loop.B, loop.E]) @ setting.spread
-    return Kernels(np.concatenate([noise[None], rows[:-1] @ NN]), push @ loop.E, slow, rows[:, :, :n])
+    return Kernels(
+        np.concatenate([first[None, :, heard], rows[:-1] @ NN]), push @ loop.E, slow, rows[:, :, :n]
+    )
 
 
 def _parts(own: Dynamics, setting: Setting, s: Fraction) -> Array:
