@@ -14,8 +14,8 @@ from tubecert.bounds.constants import ResidualConstants, WindConstants
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem, Wind
-from tubecert.conditions.proposal import Asked
 from tubecert.conditions.rates import RateRecipe
+from tubecert.conditions.theorem import Asked
 from tubecert.enclosure.constant import Constant
 from tubecert.search.distance import recipe_at
 from tubecert.search.proposers import PROPOSERS

@@ -9,9 +9,8 @@ from tubecert.bounds.constants import TABLE, BoundConstants, Constant
 from tubecert.conditions import rates
 from tubecert.conditions.distance import DistanceRecipe, margin_distance_along
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.rates import RateRecipe, margins_26_along
-from tubecert.conditions.verdict import Verdict
+from tubecert.conditions.theorem import Asked, Proposal
 from tubecert.enclosure.interval import Interval
 from tubecert.kernel import judge
 from tubecert.kinds.kind import Section
@@ -21,6 +20,7 @@ from tubecert.pipeline.certification import answer
 from tubecert.search.proposers import PROPOSERS
 from tubecert.spec import Spec
 from tubecert.stages.judged import Judged
+from tubecert.verdict import Verdict
 
 W_CONSTANT = np.array(
     [[0.20365, 0.00015, -0.00566], [0.00015, 0.21671, -0.00566], [-0.00566, -0.00566, 0.21607]]

@@ -19,12 +19,11 @@ import numpy as np
 from tubecert.conditions import alone, distance, rates
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.inputs import InputShares
-from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Proposal
-from tubecert.conditions.theorem import R, Recipe, Theorem
-from tubecert.conditions.verdict import NOTHING_FOUND, Shortfall, Verdict, unbounded
+from tubecert.conditions.problem import NOTHING_FOUND, Shortfall, TubeProblem, unbounded
+from tubecert.conditions.theorem import Proposal, R, Recipe, Theorem
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.processor import require_ieee
+from tubecert.verdict import Verdict
 
 THEOREMS: Final[Mapping[type, Theorem[Any]]] = {
     theorem.recipe: theorem for theorem in (alone.THEOREM, rates.THEOREM, distance.THEOREM)

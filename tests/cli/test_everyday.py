@@ -11,7 +11,7 @@ import pytest
 from commands import run
 
 import tubecert
-from tubecert.bounds.meanings import EVERY
+from tubecert.bounds.constants import EVERY
 from tubecert.cli.app import app
 from tubecert.cli.everyday import Schema, Template
 from tubecert.report import pages

@@ -12,11 +12,11 @@ from problems import constants
 from tubecert.conditions import alone
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked
-from tubecert.conditions.verdict import Verdict
+from tubecert.conditions.theorem import Asked
 from tubecert.kernel import Proof, check
 from tubecert.kinds.alone import KIND
 from tubecert.search.proposers import PROPOSERS
+from tubecert.verdict import Verdict
 
 LESS = 1 - 1e-9
 

@@ -11,7 +11,7 @@ from problems import constants
 
 from tubecert.conditions.inputs import InputShares, LimitedInput
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked
+from tubecert.conditions.theorem import Asked
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.kinds.table import kind_of
 from tubecert.search.proposers import PROPOSERS

@@ -18,11 +18,11 @@ from problems import ALIVE
 
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Proposal
 from tubecert.conditions.rates import RateRecipe
-from tubecert.conditions.verdict import Verdict
+from tubecert.conditions.theorem import Proposal
 from tubecert.kernel import Proof, check, judge, theorem_of
 from tubecert.search.distance import recipe_at
+from tubecert.verdict import Verdict
 
 F = Fraction
 PRINTED = 1 + 1e-8  # what is printed is rounded up

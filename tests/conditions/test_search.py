@@ -20,13 +20,13 @@ from problems import (
 from tubecert.conditions import distance as theorem_b
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked
 from tubecert.conditions.rates import RateRecipe, rate_margins
-from tubecert.conditions.verdict import Verdict
+from tubecert.conditions.theorem import Asked
 from tubecert.records import to_json
 from tubecert.search.distance import least_rate
 from tubecert.search.elasticities import elasticities_26, elasticities_distance
 from tubecert.search.proposers import LEAST, PROPOSERS
+from tubecert.verdict import Verdict
 
 
 def gains(pair) -> tuple[float, float]:

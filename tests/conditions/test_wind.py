@@ -11,7 +11,7 @@ from problems import alive, judged_26, judged_distance, two_state
 from tubecert.bounds.constants import Constant, ResidualConstants, WindConstants
 from tubecert.conditions import distance
 from tubecert.conditions.problem import TubeProblem, Wind
-from tubecert.conditions.proposal import Asked
+from tubecert.conditions.theorem import Asked
 from tubecert.conditions.wind import prediction
 from tubecert.kinds.table import KINDS
 from tubecert.search.distance import least_rate

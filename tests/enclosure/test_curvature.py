@@ -19,8 +19,7 @@ from strategies import fractions
 
 from tubecert.bounds.feedback import tangents
 from tubecert.enclosure import taylor
-from tubecert.enclosure.metric_norm import MetricNorm
-from tubecert.enclosure.objective import SumOfNorms, Target
+from tubecert.enclosure.objective import MetricNorm, SumOfNorms, Target
 from tubecert.enclosure.pencil import Pencil, SumOfPencils, WeightedPencil, Weights, scalar
 from tubecert.enclosure.projected import ProjectedPencil
 from tubecert.enclosure.taylor import MatrixFunction

@@ -7,8 +7,7 @@ import pytest
 
 from tubecert.enclosure.branch_and_bound import Effort, decide
 from tubecert.enclosure.domain import BoxDomain
-from tubecert.enclosure.independence import Dependence
-from tubecert.enclosure.objective import Target
+from tubecert.enclosure.objective import Dependence, Target
 from tubecert.expression import constant, cos, parse, sin, symbol
 from tubecert.expression.matrix import Matrix
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tubecert
-from tubecert.bounds.meanings import EVERY
+from tubecert.bounds.constants import EVERY
 from tubecert.certificate.sections import assumptions
 from tubecert.claims.assumptions import UncertaintyAsGiven
 from tubecert.model import build

@@ -9,7 +9,7 @@ import pytest
 from problems import three_state
 
 from tubecert import certificate
-from tubecert.conditions.proposal import Asked
+from tubecert.conditions.theorem import Asked
 from tubecert.kernel import NotProvenError, Proof, Unproven, check
 from tubecert.kinds.table import KINDS, kind_of
 from tubecert.letters import RATES

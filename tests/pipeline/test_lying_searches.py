@@ -12,7 +12,7 @@ from lies import KINDS, told, told_twice
 from systems import SMALL
 
 from tubecert import certificate
-from tubecert.conditions.proposal import Asked, Proposal
+from tubecert.conditions.theorem import Asked, Proposal
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline import Options, question_of
 from tubecert.pipeline.certification import answer, result

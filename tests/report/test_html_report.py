@@ -21,7 +21,7 @@ from proven import result as certified_result
 from typer.testing import CliRunner
 
 from tubecert import certificate, pipeline
-from tubecert.bounds.meanings import EVERY
+from tubecert.bounds.constants import EVERY
 from tubecert.certificate.result import Certificate, Result
 from tubecert.claims.family import Assumption
 from tubecert.cli.app import app

@@ -65,7 +65,7 @@ def labels(shown):
 
 
 def test_every_word_of_a_comparison_of_metrics_has_a_page():
-    from tubecert.certificate.searched import MetricRow
+    from tubecert.certificate.result import MetricRow
     from tubecert.report.synthesis import FLOORS, _compared
 
     row = MetricRow(

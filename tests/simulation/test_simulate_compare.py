@@ -8,8 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from simulated import FLAT, Failure, certified, runs, setting
 
-from tubecert.certificate.follows import InputBoundData
-from tubecert.certificate.result import Bound, Recipes
+from tubecert.certificate.result import Bound, InputBoundData, Recipes
 from tubecert.errors import TubecertError
 from tubecert.letters import DISTANCE, RATES
 from tubecert.simulation.adaptive.judge import RunAt, check_class, compare

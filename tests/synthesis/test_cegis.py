@@ -14,15 +14,14 @@ from systems import plain_model as system
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.tape import Tape
 from tubecert.expression.matrix import identity
-from tubecert.synthesis import cegis, parity, program
-from tubecert.synthesis.attack import Attacker
-from tubecert.synthesis.counterexample import Judgement, counterexample
+from tubecert.synthesis import cegis, program
+from tubecert.synthesis import forms as symmetries
+from tubecert.synthesis.attack import Attacker, Judgement, Region, counterexample, worst
 from tubecert.synthesis.family import MetricFamily, metric_family
 from tubecert.synthesis.forms import FormsTape, Unknowns
-from tubecert.synthesis.pivot_frame import pivot_frame, pivot_frames
+from tubecert.synthesis.frame import pivot_frame, pivot_frames
 from tubecert.synthesis.problem import SynthesisProblem
 from tubecert.synthesis.rounding import VerifiedMetric, shortest_proven
-from tubecert.synthesis.sampling import Region, worst
 from tubecert.verdict import Verdict
 
 QUICK = Effort(gap=0.5, budget=200_000)
@@ -137,12 +136,12 @@ def test_orthonormal_functions_are_the_same_family():
 def test_symmetries_are_found_and_halve_the_unknowns():
     family = metric_family(PVTOL, degree=2)
     ends = np.array([[float(a), float(b)] for a, b in PVTOL_BOX])
-    signs, mask = parity.invariant_entries(PVTOL, family, ends, FormsTape(PVTOL, family))
+    signs, mask = symmetries.invariant_entries(PVTOL, family, ends, FormsTape(PVTOL, family))
     np.testing.assert_array_equal(signs, [[-1, 1, -1, -1, 1, -1]])
     assert (mask.sum(), mask.shape) == (97, (9, 6, 6))
     uneven = ends.copy()
     uneven[2, 1] += 0.1  # the range of phi is no longer symmetric
-    signs, mask = parity.invariant_entries(PVTOL, family, uneven, FormsTape(PVTOL, family))
+    signs, mask = symmetries.invariant_entries(PVTOL, family, uneven, FormsTape(PVTOL, family))
     assert (len(signs), mask.sum()) == (0, 189)
 
 
@@ -162,10 +161,10 @@ def test_symmetries_do_not_change_the_least_kappa(monkeypatch):
 def test_canonical_points_are_mirror_images_and_unique():
     signs = np.array([[-1.0, 1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, -1.0, -1.0]])
     points = np.random.default_rng(4).normal(size=(50, 3))
-    chosen = parity.canonical(points, signs)
+    chosen = symmetries.canonical(points, signs)
     assert (np.abs(chosen) == np.abs(points)).all()
     for sign in signs:
-        np.testing.assert_array_equal(parity.canonical(points * sign, signs), chosen)
+        np.testing.assert_array_equal(symmetries.canonical(points * sign, signs), chosen)
 
 
 def test_affine_variables_are_those_of_the_conditions():

@@ -16,7 +16,7 @@ from tubecert.pipeline import Options
 from tubecert.pipeline.climb import Climb
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Synthesis, load_text
-from tubecert.synthesis.reach import beyond
+from tubecert.synthesis.problem import beyond
 from tubecert.verdict import Verdict
 
 BARE = Synthesis(rate=None, objective="adaptation", degree=0)

@@ -11,9 +11,8 @@ from tubecert.expression import constant, cos, sin, symbol, topological
 from tubecert.expression.matrix import adjugate, determinant
 from tubecert.model import build, divide
 from tubecert.spec import load
-from tubecert.synthesis.factors import reduced
-from tubecert.synthesis.lifting import at_point
-from tubecert.synthesis.pivot_frame import pivot_frame
+from tubecert.synthesis.frame import pivot_frame
+from tubecert.synthesis.lifting import at_point, reduced
 
 ROBOTS = Path(__file__).parents[2] / "benchmarks" / "robots"
 X, Y = symbol("x"), symbol("y")

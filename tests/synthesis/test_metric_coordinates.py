@@ -13,13 +13,11 @@ from tubecert.enclosure.tape import Tape
 from tubecert.model import build
 from tubecert.pipeline import Options
 from tubecert.spec import Synthesis, load_text
-from tubecert.synthesis.attempts import Request
-from tubecert.synthesis.coordinates import coordinates
-from tubecert.synthesis.family import metric_family
+from tubecert.synthesis.attempts import Request, routes
+from tubecert.synthesis.family import coordinates, metric_family
 from tubecert.synthesis.ladder import Ladder
 from tubecert.synthesis.problem import FLOORS
 from tubecert.synthesis.rounding import distance, rounded
-from tubecert.synthesis.routes import routes
 from tubecert.verdict import Verdict
 
 JOINT = """

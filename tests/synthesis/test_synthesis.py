@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from tubecert.claims.failures import VariableForbidden
 from tubecert.claims.metric import MetricContraction
 from tubecert.cli.app import app
+from tubecert.conditions.decimals import round_down
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import is_zero
@@ -22,9 +23,8 @@ from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.spec import load
 from tubecert.spec.metric_file import with_metric
-from tubecert.synthesis import cegis, routes, sos
+from tubecert.synthesis import attempts, cegis, sos
 from tubecert.synthesis.attempts import Request
-from tubecert.synthesis.decimals import digits_below
 from tubecert.synthesis.diagnose import is_hurwitz, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, invariants, metric_family, suggested
 from tubecert.synthesis.ladder import Ladder, shrunk
@@ -111,8 +111,8 @@ def test_rounding_is_symmetric_and_as_near_as_its_digits(digits, entries):
 
 
 @given(st.floats(1e-6, 1e6), st.integers(1, 6))
-def test_digits_below_are_below(value, digits):
-    low = digits_below(value, digits)
+def test_digits_rounded_down_are_below(value, digits):
+    low = round_down(value, digits)
     assert 0 < low <= Fraction(value) <= low * (1 + Fraction(10) ** (1 - digits))
 
 
@@ -244,7 +244,7 @@ def test_a_solver_that_breaks_down_has_proposed_nothing():
 @pytest.mark.parametrize("kind", ["negated", "nan", "nothing"])
 def test_a_lying_solver_writes_no_file(kind, tmp_path, monkeypatch):
     monkeypatch.setattr(cegis, "propose", liar(kind))
-    monkeypatch.setattr(routes, "routes", lambda choice: (("cegis", cegis.propose),))
+    monkeypatch.setattr(attempts, "routes", lambda choice: (("cegis", cegis.propose),))
     from tubecert.pipeline import synthesis
 
     monkeypatch.setattr(synthesis, "routes", lambda choice: (("cegis", cegis.propose),))
@@ -373,5 +373,5 @@ def test_condition_numbers_are_within_a_thousandth_of_the_least(route, rate):
 def test_the_three_state_metric_is_as_good_as_that_of_plain_sums_of_squares(choice):
     """Degree 2 at rate .999: 1.4792 elsewhere."""
     three = load(str(ROOT / "configs" / "three_state.yaml"))
-    request = Request(model=build(three), safe_set=three.safe_set, routes=routes.routes(choice), degree=2)
+    request = Request(model=build(three), safe_set=three.safe_set, routes=attempts.routes(choice), degree=2)
     assert Ladder(request).metric(Fraction("0.999")).condition_number.above <= 1.4792 * 1.001

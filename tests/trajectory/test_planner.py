@@ -18,8 +18,8 @@ from tubecert.pipeline import Options, certify, question_of
 from tubecert.pipeline.certification import answer
 from tubecert.pipeline.certification import result as result_of_answer
 from tubecert.planner import cache, ilqr
+from tubecert.planner.ilqr import Dynamics
 from tubecert.planner.propose import course_of, grid, knots_of, rounded
-from tubecert.planner.rollout import Dynamics
 from tubecert.spec import load, load_text
 from tubecert.trajectory.make import Room, plan_of
 

@@ -17,8 +17,7 @@ import tubecert
 from tubecert.certificate import seal
 from tubecert.checking.cache import key_of_system
 from tubecert.enclosure.branch_and_bound import Effort, supremum
-from tubecert.enclosure.metric_norm import MetricNorm
-from tubecert.enclosure.objective import SumOfNorms, Target
+from tubecert.enclosure.objective import MetricNorm, SumOfNorms, Target
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.errors import SpecError
 from tubecert.expression import constant, cos, number_text, sin, symbol

@@ -201,3 +201,11 @@ DERIVED: dict[str, Meaning] = {
         ("zeta_3", "zeta3", "conditions:zeta_3", "1", "effect of the state-dependence of h in (26b)"),
     )
 }
+
+
+EVERY: dict[str, Meaning] = {**TABLE, **WIND, **DERIVED}
+
+
+def meaning(name: str) -> Meaning:
+    """The same whatever the name."""
+    return EVERY.get(name, Meaning(symbol=name, equation="", unit="", words=name.replace("_", " ")))

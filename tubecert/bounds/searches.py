@@ -19,7 +19,7 @@ from tubecert.enclosure.objective import Objective, SumOfNorms, size_of
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.progress import Progress
 from tubecert.trajectory import Plan
-from tubecert.trajectory.family import starred
+from tubecert.trajectory.plan import starred
 from tubecert.tube import Ball, Ellipsoid, Section, Tube
 
 _CHEAP = 1_000  # boxes with which a constant that has a gap of its own is enclosed closer than that

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.certificate.result import MetricData
-from tubecert.certificate.searched import SolverData
+from tubecert.certificate.result import MetricData, SolverData
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Interval
 from tubecert.records import Json, to_json

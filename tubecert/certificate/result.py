@@ -6,24 +6,161 @@ is strict: what is missing, not known, or of another kind is a `FormError` that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
-from tubecert.certificate.effective import Effective
-from tubecert.certificate.follows import ClearanceData, InputData
+from tubecert.certificate.effective import Asked, Effective
 from tubecert.certificate.notes import joined, split
-from tubecert.certificate.searched import SynthesisData
 from tubecert.claims.family import Assumption, Reason
+from tubecert.claims.outcomes import Outcome
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness
-from tubecert.kinds.data import Pair, SectionData
+from tubecert.kinds.kind import Pair, SectionData
 from tubecert.kinds.table import KINDS
 from tubecert.records import FormError, from_json, keyed, to_json
 from tubecert.spec import Interpolation, Knots
 from tubecert.spec.types import PlanKind
 from tubecert.verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttemptData:
+    """One proposal of a synthesis and what became of it."""
+
+    rate: float
+    degree: int
+    floor: Literal["identity", "input"]
+    route: str
+    outcome: Outcome
+    condition_number: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricRow:
+    """One metric of a comparison; `input_gain` is beta/sqrt(a), `adaptation_rate` the least of the distance form."""
+
+    rate: Fraction
+    floor: Literal["identity", "input"]
+    degree: int
+    condition_number: float
+    verdict: Verdict | None = None
+    input_gain: float | None = None
+    rho: float | None = None
+    ultimate_radius: float | None = None
+    adaptation_rate: float | None = None
+    bandwidth: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateLimit:
+    """What is against another rate; there `factor` times the gains would be needed."""
+
+    rate: Fraction
+    cause: Literal["distance", "overshoot", "gains", "no_metric", "idle", "input_gain", "tube"]
+    factor: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateLimits:
+    """What is against slower and against faster rates than the one that was chosen."""
+
+    slower: RateLimit | None = None
+    faster: RateLimit | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SolverData:
+    """How a metric was found."""
+
+    route: str
+    degree: int
+    variables: tuple[str, ...]
+    digits: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchData:
+    """What was tried by a synthesis, and why there is no metric where there is none."""
+
+    objective: str
+    verdict: Verdict
+    attempts: tuple[AttemptData, ...]
+    rate: Fraction | None = None
+    table: tuple[MetricRow, ...] = ()
+    limits: RateLimits | None = None
+    cut: Literal["deadline", "interrupted", "no_adaptation", "plan"] | None = None
+    solver: SolverData | None = None
+    reason: Reason | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisData:
+    """What was asked of a synthesis, and how it went."""
+
+    asked: Asked
+    search: SearchData | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShapeData:
+    """Bounds over the tube of the block of W in a plane: of its diagonal, and [low, high] of what is beside it."""
+
+    diagonal: tuple[float, float]
+    beside: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClearanceData:
+    """An obstacle of the specification, in its order: the clearance of the tube, and the time at which it is least.
+
+    `inside`: a point of the obstacle that the tube contains then.
+    """
+
+    verdict: Verdict
+    decides: bool
+    clearance: Constant
+    shape: ShapeData
+    t: float | None = None
+    inside: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanInputData:
+    """Enclosures of inf u* and of sup u* on the plan, of one input."""
+
+    least: Constant
+    greatest: Constant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputBoundData:
+    """The input stays in [least, greatest] with the gains in `proof`; what feedback and adaptation add at most."""
+
+    least: float
+    greatest: float
+    feedback: float
+    adaptation: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputData:
+    """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key."""
+
+    input: str
+    limits: tuple[Fraction, Fraction]
+    verdict: Verdict
+    plan: PlanInputData
+    bounds: Mapping[str, InputBoundData]
+
+    def use(self, kinds: Iterable[str]) -> float | None:
+        """The share of its limits that it uses at most: 0 in the middle, 1 at a limit; None without bounds."""
+        found = [self.bounds[key] for key in kinds if key in self.bounds]
+        low, high = self.limits
+        ends = [end for bound in found for end in (bound.least, bound.greatest)]
+        return max((float(abs(2 * Fraction(end) - low - high) / (high - low)) for end in ends), default=None)
+
 
 Json = Any
 

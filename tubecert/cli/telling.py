@@ -101,7 +101,7 @@ def _judged(row: Row) -> str:
 def warn_of_size(system: Spec, terminal: Terminal, output: Output) -> None:
     """Says that a search is out of reach by its size, before it begins."""
     from tubecert.model import build
-    from tubecert.synthesis.reach import beyond
+    from tubecert.synthesis.problem import beyond
 
     if output.quiet or (size := beyond(build(replace(system, metric=None)))) is None:
         return

@@ -8,8 +8,7 @@ import numpy as np
 
 from tubecert.conditions.arithmetic import T, sqrt
 from tubecert.conditions.kernels import DistanceBound
-from tubecert.conditions.problem import Numbers, TubeProblem
-from tubecert.conditions.verdict import Shortfall
+from tubecert.conditions.problem import Numbers, Shortfall, TubeProblem
 from tubecert.conditions.wind import pushed
 from tubecert.enclosure.interval import Interval
 

@@ -7,7 +7,7 @@ excluded).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final, Generic
@@ -232,3 +232,35 @@ _SMALL_IS_SAFE = _INFIMA | {"rho_r", "rho_a", "lam"}
 
 def _interval(value: Interval | Fraction) -> Interval:
     return Interval.of(value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shortfall:
+    """A claim that is not proven: its margin (relative to what is allowed), both sides where known.
+
+    `claim` is `26a`, `26b`, `26c`, `distance` at gains asked for; `26a`, `initial_distance`, `plan_defect`,
+    `parameters`, `wind` where no gains can help; `wind_not_covered` where nothing follows for a wind;
+    `gain_not_covered` where nothing follows for an uncertain B; `bounded` where `constant` has no finite bound;
+    `proven_gains` where the search failed (see `ConditionHolds`).
+    """
+
+    claim: str
+    margin: Interval
+    constant: str | None = None
+    allowed: float | None = None
+    needed: float | None = None
+
+    @property
+    def missing(self) -> float | None:
+        """By how much more is needed than allowed, where both are known."""
+        return None if self.allowed is None or self.needed is None else self.needed - self.allowed
+
+
+UNKNOWN = Interval(-np.inf, np.inf)
+
+NOTHING_FOUND = (Shortfall(claim="proven_gains", margin=UNKNOWN),)
+
+
+def unbounded(names: Iterable[str]) -> tuple[Shortfall, ...]:
+    """One reason per constant without a finite bound: nothing follows from it, either way."""
+    return tuple(Shortfall(claim="bounded", constant=name, margin=UNKNOWN) for name in names)

@@ -18,9 +18,8 @@ from tubecert.conditions.arithmetic import Array, T, choose, nothing, quiet, sqr
 from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.kernels import tight_kernel
 from tubecert.conditions.obstacles import reach
-from tubecert.conditions.problem import Numbers, TubeProblem
+from tubecert.conditions.problem import Numbers, Shortfall, TubeProblem
 from tubecert.conditions.theorem import LoopGains, Theorem
-from tubecert.conditions.verdict import Shortfall
 from tubecert.conditions.wind import not_covered, prediction_error, provisos
 from tubecert.enclosure.interval import Interval
 

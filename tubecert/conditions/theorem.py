@@ -1,9 +1,12 @@
-"""A theorem as the kernel sees it: what its recipes are, and what has to be positive for a recipe to prove it."""
+"""A theorem as the kernel sees it: what its recipes are, and what has to be positive for a recipe to prove it.
+
+A `Proposal` is what a search hands over: recipes to be checked, and what it met on the way. None of it is believed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import Field, dataclass, fields
+from dataclasses import Field, dataclass, field, fields
 from fractions import Fraction
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
 
@@ -11,8 +14,7 @@ import numpy as np
 
 from tubecert.conditions.arithmetic import Array
 from tubecert.conditions.inputs import InputShares
-from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
-from tubecert.conditions.verdict import Shortfall
+from tubecert.conditions.problem import FIELDS, Numbers, Shortfall, TubeProblem
 from tubecert.enclosure.interval import Interval
 
 Margins = Mapping[str, Interval]
@@ -119,3 +121,42 @@ class _Recorder:
         # R_H is chosen from sup |h|
         self.asked.add("Dh" if name == "R" else name)
         return np.asarray(1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """Gains that a user fixes, in rad/s and 1/s^2; what is None is searched for. `curve`: whether one is wanted."""
+
+    bandwidth: Fraction | None = None
+    adaptation_rate: Fraction | None = None
+    curve: bool = True
+
+    def __bool__(self) -> bool:
+        return not (self.bandwidth is None and self.adaptation_rate is None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal(Generic[R]):
+    """Recipes of one theorem.
+
+    `decisive`: the one that the verdict is to be about, in the `role` that it has among the gains of its kind.
+    `hopeless`: where there is none, one that stands for all that could still be chosen (a rate without bound): if it is
+    refuted, so is what was asked for. `beside`: others by role. `companion`: a recipe of
+    another theorem at the decisive gains, for their ultimate radius. `curve`: a trade-off; `around`: other bandwidths
+    at the decisive gains; each of them shares one projection radius. `infimum`: the least bandwidth that (26a), (26b)
+    admit, and which of them `binds` there.
+    """
+
+    decisive: R | None = None
+    role: str = ""
+    hopeless: R | None = None
+    beside: Mapping[str, R] = field(default_factory=dict)
+    companion: Any = None
+    curve: tuple[R, ...] = ()
+    around: tuple[R, ...] = ()
+    infimum: float | None = None
+    binds: str | None = None
+
+    def at(self, role: str) -> R | None:
+        """The recipe in a role."""
+        return self.decisive if role == self.role else self.beside.get(role)

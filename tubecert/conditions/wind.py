@@ -8,8 +8,7 @@ gives back what it was given, digit by digit. Implements: theory section 7.
 from __future__ import annotations
 
 from tubecert.conditions.arithmetic import T, number, quiet, sqrt
-from tubecert.conditions.problem import Numbers, TubeProblem
-from tubecert.conditions.verdict import UNKNOWN, Shortfall
+from tubecert.conditions.problem import UNKNOWN, Numbers, Shortfall, TubeProblem
 
 
 def pushed(n: Numbers[T]) -> T:

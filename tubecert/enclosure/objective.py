@@ -1,6 +1,16 @@
 """What branch and bound maximises: convex functions of matrix functions, bounded above on boxes, below at points.
 
 Everything here is rigorous except `Estimate.corner`, `caused` and `spread`, which only steer the search.
+
+The length of a vector in the metric, sqrt(v' W^-1 v), without an inverse or a factor of W.
+
+With any T: v' W^-1 v = (Tv)' (T W T')^-1 (Tv), between |Tv|^2/lmax(T W T') and |Tv|^2/lmin(T W T'); T is proposed in
+floats such that T W T' is nearly the identity. Being linear in v, the bound stays sharp where v nearly vanishes.
+
+Whether the columns of a matrix B(x) are independent on a box, without minors or B'B.
+
+If |I - R B| < 1 for any matrix R, then R B is invertible (by its Neumann series), so B v = 0 for v = 0 only. R is
+proposed in floats, box by box: the pseudo-inverse in its middle.
 """
 
 from __future__ import annotations
@@ -12,12 +22,19 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tubecert.enclosure.interval import Array
+from tubecert.enclosure.interval import Array, Interval, sqrt
 from tubecert.enclosure.linalg import (
+    congruence,
+    eigenvalues_midrad,
+    finite,
+    midrad,
     norm_bound,
+    product,
     spectral_norm,
     spectral_norm_midrad,
+    whitening,
 )
+from tubecert.enclosure.outward import up
 from tubecert.enclosure.taylor import Expansion, Matrix, MatrixFunction
 
 
@@ -238,3 +255,83 @@ def _variation(values: Array, e: Expansion) -> Array:
             whole = norm_bound(np.abs(mid).max(axis=1))
             variation[:, i] += size * change / np.where(whole > 0, whole, 1.0)
     return variation
+
+
+class MetricNorm:
+    """|Theta v| for a column v(x) and a dual metric W(x) > 0, where Theta' Theta = W^-1."""
+
+    def __init__(self, v: Matrix, W: Matrix, fixed: frozenset[str] = frozenset()) -> None:
+        self._function = MatrixFunction([v, W], fixed=fixed)
+        self.variables = self._function.variables
+
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
+        """|T v| at the vertices plus what the rest adds, over the root of the least eigenvalue of T W T'."""
+        e = self._function.expand(lo, hi)
+        v, W = e.mid
+        t = whitening(W.mean(axis=1))[:, None]
+        spread = [e.over_vertices(e.filled(k)) for k in range(2)]
+        least = _least(t, W, spread[1])
+        length = spectral_norm_midrad(*product((t, np.zeros_like(t)), (v, spread[0]))).hi
+        value = (Interval.exact(length) / sqrt(Interval.exact(least))).hi
+        value = np.where(np.isnan(value), np.inf, value)
+        best = np.argmax(value, axis=1)
+        signs = e.signs[best]
+        corner = np.where(signs > 0, hi, np.where(signs < 0, lo, 0.5 * (lo + hi)))
+        of_v, of_W = (
+            np.tile(norm_bound(rest), len(e.signs) // rest.shape[2])
+            for rest in (np.abs(t) @ e.rest[0], e.rest[1])
+        )
+        caused = (of_v + length * of_W).max(axis=2).T
+        caused = np.where(np.isfinite(caused), caused, np.finfo(float).max)
+        return Estimate(value.max(axis=1), corner, caused, caused)
+
+    def lower(self, lo: Array, hi: Array) -> Array:
+        """Lengths at points, rounded down."""
+        v, W = (midrad(g) for g in self._function.at(lo, hi))
+        t = whitening(W[0])
+        most = eigenvalues_midrad(*congruence(t, *W)).hi[..., -1]
+        length = spectral_norm_midrad(*product((t, np.zeros_like(t)), v)).lo
+        value = (Interval.exact(length) / sqrt(Interval.exact(most))).lo
+        return np.where(np.isnan(value), -np.inf, np.maximum(value, 0.0))
+
+
+def _least(t: Array, mid: Array, rad: Array) -> Array:
+    """A lower bound of the eigenvalues of T W T'; NaN where none is positive."""
+    least = eigenvalues_midrad(*congruence(t, mid, rad)).lo[..., 0]
+    return np.where(least > 0, least, np.nan)
+
+
+class Dependence:
+    """|I - R B(x)| with an R of its own for every box: below 1 where the columns of B are independent.
+
+    It proves; a value of 1 or more says nothing about B, so that it never refutes.
+    """
+
+    def __init__(self, matrix: Matrix) -> None:
+        self._function = MatrixFunction([matrix])
+        self.variables = self._function.variables
+
+    def upper(self, lo: Array, hi: Array, target: Target) -> Estimate:
+        """The norm is convex in B: that of the affine part at its vertices, plus what the rest adds."""
+        e = self._function.expand(lo, hi)
+        R = _left_inverse(e.mid[0].mean(axis=1))[:, None]
+        exact = np.zeros_like(R)
+        mid, rad = product((R, exact), (e.mid[0], e.over_vertices(e.rad[0])))
+        departure = np.eye(R.shape[-2]) - mid
+        rad = up(rad + 2.0**-52 * np.abs(departure))  # the subtraction is rounded once, by half of that
+        rest, slack = product((np.abs(R), exact), (e.rest[0].sum(axis=0), np.zeros_like(e.rad[0])))
+        added = e.over_vertices(norm_bound(up(rest + slack)))
+        value = up(spectral_norm_midrad(departure, rad).hi + added)
+        caused = norm_bound(np.abs(R[None]) @ e.rest[0]).max(axis=2)
+        return estimate_of(value, caused, e, lo, hi)
+
+    def lower(self, lo: Array, hi: Array) -> Array:
+        """Nothing is known from below."""
+        return np.full(len(lo), -np.inf)
+
+
+def _left_inverse(middle: Array) -> Array:
+    """Floats R with R B close to the identity: a proposal, 0 where there is none."""
+    ok = finite(middle)[..., None, None]
+    inverse = np.linalg.pinv(np.where(ok, middle, 0.0))
+    return np.where(finite(inverse)[..., None, None], inverse, 0.0)

@@ -9,8 +9,7 @@ from tubecert.conditions import alone
 from tubecert.conditions.alone import NoGains
 from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.kinds import ALONE
-from tubecert.kinds.data import Pair, SectionData, margin_data, missing_data
-from tubecert.kinds.kind import Kind, Section
+from tubecert.kinds.kind import Kind, Pair, Section, SectionData, margin_data, missing_data
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,16 +12,17 @@ from tubecert.conditions.theorem import LoopGains
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Checked
 from tubecert.kinds import DISTANCE
-from tubecert.kinds.data import (
+from tubecert.kinds.kind import (
     GainPoint,
+    Kind,
     Pair,
     Role,
+    Section,
     SectionData,
     margin_data,
     missing_data,
     proven_data,
 )
-from tubecert.kinds.kind import Kind, Section
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,16 +13,17 @@ from tubecert.conditions.theorem import LoopGains
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import Checked
 from tubecert.kinds import RATES
-from tubecert.kinds.data import (
+from tubecert.kinds.kind import (
     GainPoint,
+    Kind,
     Pair,
     Role,
+    Section,
     SectionData,
     margin_data,
     missing_data,
     proven_data,
 )
-from tubecert.kinds.kind import Kind, Section
 from tubecert.records import keyed
 
 CONDITIONS = ("26a", "26b", "26c")

@@ -14,11 +14,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from tubecert.certificate import file
-from tubecert.certificate.follows import InputData
-from tubecert.certificate.result import Bound, Certificate, MetricData, Result
+from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result
 from tubecert.enclosure.interval import Array
 from tubecert.kinds import name_of
-from tubecert.kinds.data import Pair, SectionData
+from tubecert.kinds.kind import Pair, SectionData
 from tubecert.library.specification import File, Specification
 from tubecert.library.stated import Stated, array, rounded_up
 from tubecert.records import FormError, Json

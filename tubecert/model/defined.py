@@ -15,8 +15,7 @@ from tubecert.expression import (
     to_text,
 )
 from tubecert.findings import Finding
-from tubecert.model.affine import TIME, moving_parts, time_period
-from tubecert.model.zeros import nonzero, vanishes
+from tubecert.model.affine import TIME, moving_parts, nonzero, time_period, vanishes
 from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from fractions import Fraction
 
 from tubecert.enclosure.branch_and_bound import Decision, Effort, decide
 from tubecert.enclosure.domain import BoxDomain, Range
-from tubecert.enclosure.independence import Dependence
 from tubecert.enclosure.interval import fraction_bounds
+from tubecert.enclosure.objective import Dependence
 from tubecert.enclosure.pencil import scalar
 from tubecert.enclosure.taylor import MOST_VERTICES
 from tubecert.expression import (
@@ -26,8 +26,7 @@ from tubecert.expression.matrix import (
     determinant,
     null_space,
 )
-from tubecert.model.affine import ControlAffineModel
-from tubecert.model.zeros import decimals, nonzero, round_zero
+from tubecert.model.affine import ControlAffineModel, decimals, nonzero, round_zero
 from tubecert.verdict import Verdict
 
 _RANK_BUDGET = 20_000

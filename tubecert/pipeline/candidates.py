@@ -13,11 +13,10 @@ from typing import Any
 from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Claim
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked
+from tubecert.conditions.theorem import Asked
 from tubecert.kernel import overall
 from tubecert.kinds import ALONE, DISTANCE
-from tubecert.kinds.data import Pair, SectionData
-from tubecert.kinds.kind import Section
+from tubecert.kinds.kind import Pair, Section, SectionData
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import defect_share, mending, plan, tube
 from tubecert.pipeline.reasons import reasons

@@ -14,7 +14,7 @@ from tubecert.certificate.result import Result
 from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Reason
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked
+from tubecert.conditions.theorem import Asked
 from tubecert.kinds.table import KINDS, kind_of
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed

@@ -15,14 +15,14 @@ from math import inf, log2, sqrt
 
 import numpy as np
 
-from tubecert.certificate.searched import RateLimit, RateLimits
+from tubecert.certificate.result import RateLimit, RateLimits
 from tubecert.claims.tube import TubeInSafeSet, TubeRadius
+from tubecert.conditions.decimals import round_down
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel
 from tubecert.pipeline.deadline import Cut
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Spec
-from tubecert.synthesis.decimals import digits_below, two_digits
 from tubecert.synthesis.problem import FLOORS, Floor
 
 _DOUBLINGS, _HALVINGS = 12, 10
@@ -140,7 +140,7 @@ class Climb:
         above = self.tried.get(start)
         for k in range(1, _HALVINGS + 1):
             before = self.best
-            row = self._try(digits_below(start / 2**k, 3))
+            row = self._try(round_down(start / 2**k, 3))
             if self.ended or (before is not None and self.best is before):
                 return
             if row is not None and not row.counts and not (_overshoots(row) and _rounder(row, above)):
@@ -163,7 +163,7 @@ class Climb:
         """Rates halfway, in their logarithms, to the neighbours that were tried."""
         slower = max((rate for rate in self.tried if rate < best), default=None)
         faster = min((rate for rate in self.tried if rate > best), default=None)
-        return [digits_below(sqrt(best * other), 3) for other in (slower, faster) if other is not None]
+        return [round_down(sqrt(best * other), 3) for other in (slower, faster) if other is not None]
 
     def _score(self, row: Row) -> tuple[float, ...]:
         return row.score(self.objective)
@@ -200,7 +200,7 @@ def slow_scale(model: ControlAffineModel, spec: Spec) -> Fraction:
     scale = _slowest(A) / _BELOW
     if spec.trajectory.horizon is not None:
         scale = max(scale, 1 / float(spec.trajectory.horizon))
-    return two_digits(Fraction(scale * _UP))
+    return round_down(Fraction(scale * _UP), 2)
 
 
 def pace(slow: Fraction) -> Fraction:

@@ -19,7 +19,7 @@ from tubecert.bounds.constants import TABLE, WIND, Constant
 from tubecert.conditions.alone import supremum
 from tubecert.conditions.decimals import round_down
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked
+from tubecert.conditions.theorem import Asked
 from tubecert.kinds.table import kind_of
 from tubecert.search.proposers import PROPOSERS
 from tubecert.search.scan import serves

@@ -23,13 +23,14 @@ from tubecert.claims.family import Reason, Relax
 from tubecert.claims.gains import ConditionHolds
 from tubecert.claims.limits import InputWithinLimits, ObstacleCleared
 from tubecert.conditions.inputs import InputBound, JudgedInput, LimitedInput
-from tubecert.conditions.verdict import Shortfall, Verdict
+from tubecert.conditions.problem import Shortfall
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.interval import Interval
 from tubecert.kinds.kind import Section
 from tubecert.search.proposers import Explained
 from tubecert.stages.bounded import Bounded, Cleared
 from tubecert.stages.judged import Judged
+from tubecert.verdict import Verdict
 
 _OF_PREDICTOR = ("26c", "distance")  # conditions that another predictor may satisfy
 _NOTABLE = 0.995  # a factor above it is not worth a word

@@ -34,6 +34,7 @@ from tubecert.claims.failures import (
 from tubecert.claims.family import Reason, Relax
 from tubecert.claims.metric import MetricFound
 from tubecert.claims.tube import TubeInSafeSet
+from tubecert.conditions.decimals import round_down
 from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness
@@ -58,14 +59,12 @@ from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options
 from tubecert.stages.question import Question
-from tubecert.synthesis.attempts import Request
-from tubecert.synthesis.decimals import digits_below
+from tubecert.synthesis.attempts import Request, routes
 from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError
 from tubecert.synthesis.ladder import Ladder
 from tubecert.synthesis.problem import FLOORS, Floor
 from tubecert.synthesis.rounding import VerifiedMetric
-from tubecert.synthesis.routes import routes
 from tubecert.verdict import Verdict
 
 _RATES = 5  # of a table
@@ -243,7 +242,7 @@ class SynthesisRun:
     def _over_rates(self, last: Fraction) -> None:
         for k in range(_RATES):
             for floor in FLOORS:
-                self._compare(digits_below(last / 2**k, 3), floor, full=True)
+                self._compare(round_down(last / 2**k, 3), floor, full=True)
 
     def _compare(self, rate: Fraction, floor: Floor, full: bool) -> Row | None:
         """A row for a metric of this rate; None if there is none."""

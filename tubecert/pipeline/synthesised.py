@@ -11,7 +11,7 @@ from math import inf, log
 
 from tubecert.certificate.effective import Asked
 from tubecert.certificate.metric_file import MetricFile
-from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SearchData, SynthesisData
+from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SearchData, SynthesisData
 from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Claim, Reason
 from tubecert.claims.tube import PlanBounded

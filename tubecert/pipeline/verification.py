@@ -11,7 +11,7 @@ from fractions import Fraction
 from math import isfinite
 
 from tubecert.certificate.metric_file import MetricFile, metric_file
-from tubecert.certificate.searched import SolverData
+from tubecert.certificate.result import SolverData
 from tubecert.certificate.sections import metric_data
 from tubecert.claims.family import Reason
 from tubecert.claims.metric import MetricContraction, RankOfB

@@ -18,7 +18,7 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
 from tubecert.planner import cache, ilqr
-from tubecert.planner.rollout import Dynamics
+from tubecert.planner.ilqr import Dynamics
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.release import __version__
 from tubecert.spec import Knots, Spec, Task, canonical

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import islice
 
-from tubecert.bounds.meanings import EVERY, meaning
-from tubecert.certificate.follows import InputData
-from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
+from tubecert.bounds.constants import EVERY, meaning
+from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
 from tubecert.claims.limits import InputWithinLimits
 from tubecert.digits import UNKNOWN, down, exact, short, up
 from tubecert.records import to_json

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from io import StringIO
 
-from tubecert.certificate.searched import MetricRow
+from tubecert.certificate.result import MetricRow
 
 _PANELS = (
     ("condition_number", "condition number"),

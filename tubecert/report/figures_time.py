@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from tubecert.certificate.follows import InputData
-from tubecert.certificate.result import Result
+from tubecert.certificate.result import InputData, Result
 from tubecert.report import planned
 from tubecert.report.figures_axes import Point
 from tubecert.report.figures_scene import Drawing

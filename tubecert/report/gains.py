@@ -8,7 +8,7 @@ from math import isfinite
 
 from tubecert.certificate.result import Result
 from tubecert.digits import exact, percent
-from tubecert.kinds.data import Pair
+from tubecert.kinds.kind import Pair
 from tubecert.verdict import Verdict
 from tubecert.words.conditions import ROLES, SECTIONS
 

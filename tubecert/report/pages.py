@@ -119,7 +119,7 @@ def equations() -> Mapping[str, EquationPage]:
 @cache
 def constants() -> Mapping[str, ConstantPage]:
     """The pages of the constants, by their names in a certificate."""
-    from tubecert.bounds.meanings import EVERY
+    from tubecert.bounds.constants import EVERY
 
     data = _data("constants")
     return {

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from tubecert.certificate.result import Certificate, Result
 from tubecert.claims.family import Claim
-from tubecert.kinds.data import Pair, SectionData
+from tubecert.kinds.kind import Pair, SectionData
 from tubecert.kinds.table import KINDS
 from tubecert.report.outline import widths
 from tubecert.sampled_loop.record import Certificate as SampledCertificate

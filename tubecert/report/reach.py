@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from tubecert.certificate.follows import InputData
-from tubecert.certificate.result import Result, TubeData
+from tubecert.certificate.result import InputData, Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, near, percent, short, up
 from tubecert.report.claimed import horizon, radius
 from tubecert.report.gains import NAMES

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.bounds.meanings import EVERY
+from tubecert.bounds.constants import EVERY
 from tubecert.certificate.result import Result
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe

@@ -14,7 +14,7 @@ from tubecert.words.claims import message, outcome
 
 if TYPE_CHECKING:
     from tubecert.certificate.metric_file import MetricFile
-    from tubecert.certificate.searched import AttemptData, MetricRow, RateLimits, SearchData
+    from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SearchData
 
 FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts

@@ -14,8 +14,8 @@ from tubecert.expression import derivatives, free_symbols
 from tubecert.expression.matrix import jacobian
 from tubecert.model import TIME, time_period
 from tubecert.sampled_loop.setting import Loop
-from tubecert.trajectory.family import Family
 from tubecert.trajectory.pieces import PiecewisePlan
+from tubecert.trajectory.plan import Family
 
 _TIMES: Final = 64  # windows of a period of h, beside a plan that does not share it
 MOST: Final = 4096  # windows that a proof may ask for

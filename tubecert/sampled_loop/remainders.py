@@ -23,7 +23,7 @@ from tubecert.model import TIME
 from tubecert.sampled_loop.cells import cells_of, end_of, in_time, largest_jump, steepness
 from tubecert.sampled_loop.matrices import SUMMED, lengths, total
 from tubecert.sampled_loop.setting import PLAN_ROUNDING, Loop, driven
-from tubecert.trajectory.family import Family
+from tubecert.trajectory.plan import Family
 
 _LEVELS: Final = 4
 

@@ -28,8 +28,7 @@ from tubecert.sampled_loop.matrices import lengths, nothing, total
 from tubecert.sampled_loop.record import HexMatrix, Nominal, Tables
 from tubecert.spec import Spec
 from tubecert.spec.types import Afterwards, Hardware, Hold, Knots, Vector
-from tubecert.trajectory.family import Family
-from tubecert.trajectory.plan import Plan
+from tubecert.trajectory.plan import Family, Plan
 
 ROUNDING: Final = {"single": 2.0**-24, "double": 2.0**-53}
 _DEFECT: Final = Effort(gap=0.05, absolute=1e-9, budget=20_000)

@@ -31,7 +31,7 @@ from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders, Sizes
 from tubecert.sampled_loop.responses import Responses
 from tubecert.sampled_loop.setting import PLAN_ROUNDING, ROUNDING, Controller, Loop
-from tubecert.trajectory.family import Family
+from tubecert.trajectory.plan import Family
 from tubecert.verdict import Verdict
 
 MOST_LAGS: Final = 50_000

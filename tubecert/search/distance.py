@@ -18,7 +18,7 @@ from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.problem import Numbers, TubeProblem
-from tubecert.conditions.proposal import Asked, Proposal
+from tubecert.conditions.theorem import Asked, Proposal
 from tubecert.conditions.wind import felt, is_felt, pushed, taken
 from tubecert.kernel import obstacles
 from tubecert.search.bandwidths import bandwidths_around

@@ -10,8 +10,8 @@ from typing import Any, Final, Protocol
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.rates import RateRecipe
+from tubecert.conditions.theorem import Asked, Proposal
 from tubecert.search.distance import least_distance, propose_distance
 from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
 from tubecert.search.rates import least_rates, propose_rates

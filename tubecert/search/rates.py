@@ -16,8 +16,8 @@ from tubecert.conditions.arithmetic import Array, quiet
 from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.proposal import Asked, Proposal
 from tubecert.conditions.rates import RateRecipe, theta, zetas
+from tubecert.conditions.theorem import Asked, Proposal
 from tubecert.search import distance
 from tubecert.search.bandwidths import Bandwidth, RateSearch, bandwidth, bandwidths_around
 from tubecert.search.scan import minimum_log, serves, smallest

@@ -9,7 +9,7 @@ from typing import Any
 
 from tubecert.bounds.constants import DERIVED, Meaning
 from tubecert.conditions.inputs import JudgedInput, LimitedInput
-from tubecert.conditions.proposal import Proposal
+from tubecert.conditions.theorem import Proposal
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import overall
 from tubecert.kinds import RATES

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from tubecert.bounds.start import InitialState, KnownStart, StartBox, StartWithin
 from tubecert.bounds.suprema import Suprema
-from tubecert.certificate.searched import SynthesisData
+from tubecert.certificate.result import SynthesisData
 from tubecert.certificate.sections import declared_metric, declared_uncertainty
 from tubecert.claims.family import Claim, Reason, Relax
 from tubecert.enclosure.branch_and_bound import Effort

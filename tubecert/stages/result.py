@@ -10,15 +10,19 @@ from fractions import Fraction
 from tubecert.bounds.compute import Radius
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
-from tubecert.certificate.follows import ClearanceData, InputBoundData, InputData, PlanInputData, ShapeData
 from tubecert.certificate.result import (
     Bound,
+    ClearanceData,
     Geodesics,
+    InputBoundData,
+    InputData,
     MetricData,
     Overrides,
     PlanData,
+    PlanInputData,
     Recipes,
     Result,
+    ShapeData,
     Source,
     TubeData,
     Work,

@@ -12,7 +12,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.metric.verify import Proofs
 from tubecert.model import ControlAffineModel
 from tubecert.progress import Progress
-from tubecert.synthesis.coordinates import Choice
+from tubecert.synthesis.family import Choice
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
 from tubecert.synthesis.rounding import Rejected, VerifiedMetric
 
@@ -109,3 +109,15 @@ def guarded(name: str, route: Route, problem: SynthesisProblem) -> Proposal:
             seconds=time.perf_counter() - started,
             solver_seconds=0.0,
         )
+
+
+def routes(choice: str) -> tuple[tuple[str, Route], ...]:
+    """The route that was chosen; for `auto` both: counterexamples for constant W, sums of squares first where it moves.
+
+    Counterexamples treat every expression, sums of squares only polynomials, sines and cosines.
+    """
+    from tubecert.synthesis import cegis, sos
+
+    known: dict[str, Route] = {"cegis": cegis.propose, "sos": sos.propose_sos}
+    names = ("cegis", "sos") if choice == "auto" else (choice,)
+    return tuple((name, known[name]) for name in names)

@@ -15,11 +15,9 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.progress import Phase, Step
-from tubecert.synthesis.attack import Attack, Attacker
+from tubecert.synthesis.attack import Attack, Attacker, Judgement, counterexample, floats
 from tubecert.synthesis.conic import ConicSolution
-from tubecert.synthesis.counterexample import Judgement, counterexample
-from tubecert.synthesis.forms import FormsTape, Unknowns
-from tubecert.synthesis.parity import canonical, invariant_entries
+from tubecert.synthesis.forms import FormsTape, Unknowns, canonical, invariant_entries
 from tubecert.synthesis.problem import Proposal, SynthesisProblem
 from tubecert.synthesis.program import (
     PointProgram,
@@ -28,7 +26,6 @@ from tubecert.synthesis.program import (
     finite,
     metric_points,
 )
-from tubecert.synthesis.sampling import floats
 from tubecert.verdict import Verdict
 
 ROUTE = "cegis"

@@ -12,9 +12,9 @@ from dataclasses import replace
 from fractions import Fraction
 from math import inf, sqrt
 
+from tubecert.conditions.decimals import round_down
 from tubecert.progress import Phase, Step
 from tubecert.synthesis.attempts import Attempt, Box, Request, Route, attempted, guarded, kappa
-from tubecert.synthesis.decimals import digits_below, two_digits
 from tubecert.synthesis.family import MetricFamily, metric_family
 from tubecert.synthesis.problem import Floor, SynthesisProblem
 from tubecert.synthesis.rounding import Rejected, VerifiedMetric, shortest_proven
@@ -74,13 +74,13 @@ class Ladder:
             return None
         failed = None
         while failed is None and best.rate < _MOST * self.request.pace:
-            found = self._within(two_digits(best.rate * 2), limit)
-            failed = two_digits(best.rate * 2) if found is None else None
+            found = self._within(round_down(best.rate * 2, 2), limit)
+            failed = round_down(best.rate * 2, 2) if found is None else None
             best = found or best
         if failed is None:
             return best
         while failed > best.rate * Fraction(sharp):
-            middle = digits_below(sqrt(best.rate * failed), 4)
+            middle = round_down(sqrt(best.rate * failed), 4)
             if not best.rate < middle < failed:
                 break
             found = self._within(middle, limit)
@@ -90,9 +90,9 @@ class Ladder:
     def lower_rate(self, rate: Fraction) -> Fraction | None:
         """A rate below one that does not work, found with few quick attempts; None if none of them works."""
         quick = self._quick()
-        factor = _largest(lambda f: quick._within(two_digits(rate * f), self.request.limit) is not None)
+        factor = _largest(lambda f: quick._within(round_down(rate * f, 2), self.request.limit) is not None)
         self.rounds += quick.rounds
-        return factor and two_digits(rate * factor)
+        return factor and round_down(rate * factor, 2)
 
     def smaller_box(self, rate: Fraction) -> Fraction | None:
         """A factor by which the box, shrunk about its centre, has a metric at `rate`; likewise."""

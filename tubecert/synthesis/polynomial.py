@@ -19,8 +19,7 @@ from tubecert.expression.matrix import Matrix, adjugate, along, combine, determi
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.chart import Chart, NotPolynomialError, Variable, degrees_of, highest, total
 from tubecert.synthesis.conic import triangle
-from tubecert.synthesis.forms import FormsTape, Unknowns
-from tubecert.synthesis.parity import invariant_entries
+from tubecert.synthesis.forms import FormsTape, Unknowns, invariant_entries
 from tubecert.synthesis.problem import SynthesisProblem
 
 Array = NDArray[np.float64]

@@ -7,10 +7,10 @@ from fractions import Fraction
 from typing import Final, Literal
 
 from tubecert.enclosure.interval import Array
+from tubecert.expression import free_symbols
 from tubecert.model import ControlAffineModel
 from tubecert.progress import Progress
-from tubecert.synthesis.coordinates import Choice, Coordinates, coordinates, input_size
-from tubecert.synthesis.family import MetricFamily
+from tubecert.synthesis.family import Choice, Coordinates, MetricFamily, coordinates, input_size
 
 Floor = Literal["identity", "input"]
 FLOORS: Final[tuple[Floor, ...]] = ("identity", "input")
@@ -75,3 +75,29 @@ class Proposal:
     rounds: int = 1
     seconds: float
     solver_seconds: float
+
+
+# the largest that was seen to end has nine states, of which three move; a chain of ten, one that moves
+_STATES: Final = 10
+_MOVING: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Size:
+    """Slopes depend on `moving` states, in which a box has `vertices`; `entries`: unknown numbers of a constant W."""
+
+    states: int
+    entries: int
+    moving: int
+    vertices: int
+
+
+def beyond(model: ControlAffineModel) -> Size | None:
+    """The size of a search that is out of reach; None if it is not known to be."""
+    n = len(model.states)
+    if n < _STATES:  # slopes are not asked for in vain
+        return None
+    moving = len(free_symbols(e for row in (*model.f_x, *model.B) for e in row) & {*model.states})
+    if moving < _MOVING:
+        return None
+    return Size(states=n, entries=n * (n + 1) // 2, moving=moving, vertices=2**moving)

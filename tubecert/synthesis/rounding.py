@@ -21,8 +21,7 @@ from tubecert.expression.matrix import Matrix
 from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.attack import Attack, Attacker
-from tubecert.synthesis.coordinates import Choice, functions_at
-from tubecert.synthesis.family import MetricFamily
+from tubecert.synthesis.family import Choice, MetricFamily, functions_at
 from tubecert.synthesis.forms import FormsTape
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
 from tubecert.verdict import Verdict

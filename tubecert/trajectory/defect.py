@@ -14,8 +14,7 @@ import numpy as np
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.domain import BoxDomain, Domain
-from tubecert.enclosure.metric_norm import MetricNorm
-from tubecert.enclosure.objective import Objective, SumOfNorms
+from tubecert.enclosure.objective import MetricNorm, Objective, SumOfNorms
 from tubecert.enclosure.pencil import Pencil
 from tubecert.expression import ZERO
 from tubecert.expression.matrix import Matrix, identity

@@ -22,9 +22,8 @@ from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Knots, Spec, Task
 from tubecert.trajectory.defect import Defect
-from tubecert.trajectory.family import family
 from tubecert.trajectory.pieces import piecewise_plan
-from tubecert.trajectory.plan import Plan
+from tubecert.trajectory.plan import Plan, family
 
 _SHARE = 1e-3  # of the tube that a planned curve's defect may cost
 MISS = Fraction(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from math import inf
 from typing import Any
 
-from tubecert.bounds.meanings import EVERY
+from tubecert.bounds.constants import EVERY
 from tubecert.claims.bounds import ConstantBounded, UncertaintyBound
 from tubecert.claims.failures import (
     ConditionNumber,

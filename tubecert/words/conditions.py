@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tubecert import kinds
-from tubecert.kinds.data import Role
+from tubecert.kinds.kind import Role
 
 # what a certificate is called where its gains stand
 SECTIONS: Mapping[str, str] = {name.key: str(name) for name in kinds.NAMES}

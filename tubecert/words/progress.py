@@ -10,7 +10,7 @@ from tubecert.letters import NAMES
 from tubecert.progress import Phase, Step, Unit
 
 if TYPE_CHECKING:
-    from tubecert.synthesis.reach import Size
+    from tubecert.synthesis.problem import Size
 
 COUNTED: Final = {
     Phase.CERTIFICATION: "claims",
@@ -132,6 +132,6 @@ def _name(step: Step) -> str:
     bounds_a_constant = step.phase in _OF_CONSTANTS and step.unit is Unit.BOXES
     if not bounds_a_constant:
         return step.name
-    from tubecert.bounds.meanings import EVERY  # with numerics, which are there where constants are bounded
+    from tubecert.bounds.constants import EVERY  # with numerics, which are there where constants are bounded
 
     return EVERY[step.name].words if step.name in EVERY else step.name.replace("_", " ")

@@ -16,8 +16,7 @@ import numpy as np
 
 from tubecert.certificate.belonging import as_set, compared
 from tubecert.certificate.file import incomplete
-from tubecert.certificate.follows import InputBoundData
-from tubecert.certificate.result import Result
+from tubecert.certificate.result import InputBoundData, Result
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.rates import RateRecipe
 from tubecert.enclosure.interval import Array
