@@ -343,7 +343,7 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("{epsilon: 0.1, rho_a: 0.05}", "{half-widths: {z: 0.1}}", "TC103", 19, 8, "did you mean half_widths? known keys:"),
     ("{epsilon: 0.1, rho_a: 0.05}", "{widths: {z: 0.1}}", "TC103", 19, 8, "did you mean half_widths? known keys:"),
     ("{epsilon: 0.1, rho_a: 0.05}", "{epsilon: 0.1, half_widths: {z: 0.1}}", "TC112", 19, 17, "they fix the whole tube: give one of the two"),
-    ("{epsilon: 0.1, rho_a: 0.05}", "{epsilon: 5, rho_a: 0.05}", "TC406", 19, 7, "needs a radius of at least 5.06"),
+    ("{epsilon: 0.1, rho_a: 0.05}", "{epsilon: 5, rho_a: 0.05}", "TC406", 19, 7, "the tube reaches v* +-5.07"),
     ("rho_a: 0.05}", "rho_a: 0.05, windows: 0}", "TC103", 19, 35, "one tube holds for the whole plan"),
     ("F: [-8, 8]", "F: [8, -8]", "TC112", 23, 13, "write [lower, upper]"),
     ("F: [-8, 8]", "F: 8", "TC106", 23, 13, "write [-8, 8], or whatever its ends are"),

@@ -84,7 +84,7 @@ def test_units_change_no_gain(plain, s):
 @pytest.mark.slow
 def test_the_same_half_widths_need_less_of_the_filter_than_a_ball():
     """A row of the table in docs/tubes.md: speeds in 4 rad/s, which was the best that scaling by hand could do."""
-    ball = certify(load_text(joint(4, tube="epsilon: 0.05, rho_a: 0.03")), COARSE)
+    ball = certify(load_text(joint(4, tube="epsilon: 0.05, rho_a: 0.03, coordinates: identity")), COARSE)
     scale = {"q": 1, "w": 4, "th": 1, "om": 4}
     widths = {name: width * scale[name] for name, width in ball.tube.half_widths.items()}
     asked = ", ".join(f"{name}: {width:.3g}" for name, width in widths.items())
@@ -117,12 +117,21 @@ def test_a_tube_whose_half_widths_fit_is_not_refused():
     assert widths["q"] == pytest.approx(0.3, rel=1e-6)
     assert widths["w"] == pytest.approx(0.3 * np.sqrt(2.4 / 0.3), rel=1e-6)
     assert float(found.tube.rho) > 0.4  # a ball of that radius would leave
-    same = certify(
-        load_text(PENDULUM.replace("TUBE", "epsilon: 0.27, rho_a: 0.27, coordinates: auto")), COARSE
+
+
+@pytest.mark.slow
+def test_a_radius_is_how_far_the_state_is_off_that_moves_farthest_whatever_the_scale_of_the_metric():
+    text = PENDULUM.replace("TUBE", "epsilon: 0.4, rho_a: 0.4, coordinates: auto")
+    own = certify(load_text(text), COARSE)
+    quarter = certify(
+        load_text(text.replace("[[0.3, -0.6], [-0.6, 2.4]]", "[[1.2, -2.4], [-2.4, 9.6]]")), COARSE
     )
-    assert same.verdict is Verdict.CERTIFIED
-    assert float(same.tube.rho) == pytest.approx(0.54)
-    assert same.tube.half_widths["q"] == pytest.approx(0.54 * np.sqrt(0.3), rel=1e-6)
+    for found in (own, quarter):
+        assert found.verdict is Verdict.CERTIFIED
+        assert float(found.tube.rho) == pytest.approx(0.8)
+        assert found.tube.half_widths["w"] == pytest.approx(0.8, rel=1e-5)
+        assert found.tube.half_widths["q"] == pytest.approx(0.8 * np.sqrt(0.3 / 2.4), rel=1e-5)
+    assert gains(own) == pytest.approx(gains(quarter), rel=1e-2)
 
 
 def test_half_widths_that_leave_the_safe_set_are_told_by_state():

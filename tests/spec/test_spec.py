@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tubecert.certificate.effective import as_file
 from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
 from tubecert.expression import RESERVED, free_symbols, to_text
 from tubecert.findings import Finding
@@ -25,6 +26,19 @@ OK = sorted((ROOT / "tests/specs/ok").glob("*.yaml"))
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 BAD = sorted((ROOT / "tests/specs/bad").glob("*.yaml"))
 MINIMAL = (ROOT / "tests/specs/ok/minimal.yaml").read_text()
+UNLIKE = """tubecert: 1
+name: unlike
+system:
+  states: [x, y]
+  inputs: [u]
+  f: [y, -x]
+  B: [[0], [1]]
+  UNITS
+safe_set: {x: [-1, 1], y: [-1, 1]}
+uncertainty: {h: ["0.1*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0, 0]}
+metric: {dual_metric: [[1, -0.5], [-0.5, 1]], rate: 0.4}
+"""
 EXPECT = re.compile(r'# expect: (TC\d+) (\d+:\d+) "(.*)"')
 
 
@@ -54,9 +68,26 @@ def test_good_files_load(path: Path) -> None:
 @pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
 def test_the_canonical_form_is_a_specification_of_the_same_system(path: Path) -> None:
     data = canonical(load_question(str(path)))
-    again = load_text(json.dumps(data), "canonical.json", "question")
+    said = json.dumps(as_file(data))
+    again = load_text(said, "canonical.json", "question")
     assert canonical(again) == data
-    assert canonical(load_text(yaml.safe_dump(data), "canonical.yaml", "question")) == data
+    assert canonical(load_text(yaml.safe_dump(json.loads(said)), "canonical.yaml", "question")) == data
+
+
+@pytest.mark.parametrize(
+    ("units", "chosen"),
+    [
+        ("", "identity"),
+        ("units: {x: m, y: m, u: N}", "identity"),
+        ("units: {x: m, u: N}", "identity"),
+        ("units: {x: m, y: m/s}", "auto"),
+    ],
+)
+def test_states_of_unlike_units_are_not_measured_by_a_ball(units: str, chosen: str) -> None:
+    text = UNLIKE.replace("UNITS", units)
+    assert load_text(text).tube.coordinates == chosen
+    assert load_text(text + "tube: {epsilon: 0.1, coordinates: identity}").tube.coordinates == "identity"
+    assert ("coordinates" in canonical(load_text(text))["tube"]) == (chosen == "auto")
 
 
 @pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)

@@ -157,6 +157,11 @@ class Effective:
         found = self.data.get(name)
         return [_mapping(item) for item in found] if isinstance(found, list) else []
 
+    @property
+    def text(self) -> str:
+        """The text of the specification, as a file may hold it."""
+        return json.dumps(as_file(self.data))
+
     def at_rest(self, without: Collection[str]) -> str:
         """The text of a specification at rest at 0, for where the plan is in a file that is elsewhere.
 
@@ -165,7 +170,7 @@ class Effective:
         rest = {"kind": "equilibrium", "at": ["0"] * len(self.system.states)}
         if "horizon" in (own := self.part("trajectory")):  # an f that depends on t needs one
             rest["horizon"] = own["horizon"]
-        kept = {key: value for key, value in self.data.items() if key not in without}
+        kept = {key: value for key, value in as_file(self.data).items() if key not in without}
         return json.dumps(kept | {"trajectory": rest})
 
     @classmethod
@@ -182,6 +187,12 @@ class Effective:
             disturbance=view.disturbance,
             obstacles=view.obstacles,
         )
+
+
+def as_file(data: Mapping[str, Tree]) -> dict[str, Tree]:
+    """Canonical data as a file: that the tube is a ball goes without saying in the one, in the other it may not."""
+    ball = "tube" in data and "hardware" not in data and "coordinates" not in data["tube"]
+    return {**data, "tube": {**data["tube"], "coordinates": "identity"}} if ball else dict(data)
 
 
 def _mapping(value: Tree) -> Mapping[str, Tree]:

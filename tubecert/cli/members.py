@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,8 +28,7 @@ def _family(path: str) -> Spec:
     if Path(path).suffix.lower() == ".json":
         from tubecert.library.reading import read
 
-        effective = read(path).result.spec.effective
-        spec = load_text(json.dumps(dict(effective.data)), path)
+        spec = load_text(read(path).result.spec.effective.text, path)
     else:
         spec = load(path)
     if spec.trajectory.bundle is None:

@@ -92,7 +92,7 @@ class Stated(Generic[C]):
         """
         if self.given is not None:
             return self.given
-        spec, own = load_text(file.dump(self.effective.data), "<certificate>"), self.certificate
+        spec, own = load_text(self.effective.text, "<certificate>"), self.certificate
         knots = own.result.planned if isinstance(own, SampledCertificate) else own.result.plan.exact_knots()
         if (table := spec.trajectory.table) is not None and table.knots != knots:
             message = f"the plan in {table.file}, as it stands, is another one than that of the certificate"

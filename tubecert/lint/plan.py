@@ -20,6 +20,7 @@ from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.floats import floats, nearest
 from tubecert.lint.names import turned
+from tubecert.lint.room import least_radius, room_findings
 from tubecert.lint.table import paid, table_findings
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.spec import Obstacle, Spec, Vector
@@ -44,12 +45,12 @@ def plan_findings(spec: Spec) -> list[Finding]:
     curve = curve_of(spec)
     findings = [*_start(spec)]
     outside = list(_outside(spec, curve))
-    findings += outside or _room(spec, curve)
+    findings += outside or room_findings(spec, curve.t, curve.x)
     findings += _beyond_limits(spec, curve)
     if not outside and spec.trajectory.written:
         findings += _defect(spec, curve, build(spec))
     if spec.trajectory.table is not None:  # exchanged columns leave the safe set, too
-        findings += table_findings(spec, spec.trajectory.table, build(spec), _least_radius(spec))
+        findings += table_findings(spec, spec.trajectory.table, build(spec), least_radius(spec))
     return findings if spec.trajectory.bundle is not None else [*findings, *_obstacles(spec, curve)]
 
 
@@ -154,39 +155,6 @@ def _beyond_limits(spec: Spec, curve: Curve) -> Iterator[Finding]:
             )
 
 
-def _least_radius(spec: Spec) -> float:
-    """No tube of this specification is thinner: epsilon + rho_a + the initial offset (0 where unknown).
-
-    Of half-widths it is the least one, for comparison only: the other states make the tube thinner.
-    """
-    tube = spec.tube
-    if tube.half_widths:
-        return nearest(min(width for _, width in tube.half_widths))
-    radius = nearest((tube.epsilon or Fraction(0)) + (tube.rho_a or Fraction(0)))
-    return radius + (0.0 if spec.within is None else nearest(spec.within))
-
-
-def _room(spec: Spec, curve: Curve) -> Iterator[Finding]:
-    if spec.tube.auto or spec.hardware is not None:  # how far it reaches in x is to be found
-        return
-    offset = 0.0
-    if spec.within is None and spec.trajectory.task is None:
-        spread = floats([(high - low) / 2 for low, high in spec.start_box] or [Fraction(0)] * len(spec.x0))
-        offset = float(np.linalg.norm(np.abs(floats(spec.x0) - curve.x[0]) + spread))
-    rho = _least_radius(spec) + offset
-    k, i, beyond = _excess(spec, curve.x)
-    if not math.isfinite(rho) or beyond + rho <= _ROUNDING * rho:
-        return
-    when = "" if len(curve.t) == 1 else f" at t = {near(curve.t[k], 4)} s"
-    yield Finding(
-        code=codes.NO_ROOM,
-        message=f"the tube needs a radius of at least {near(rho, 4)} (epsilon + rho_a + initial offset), but{when} "
-        f"the plan is only {near(-beyond, 4)} from the {spec.states[i]} side of the safe set",
-        location=spec.location("tube") or spec.location("safe_set"),
-        help="reduce tube.epsilon, tube.rho_a or the initial offset, or enlarge the safe set",
-    )
-
-
 def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Finding]:
     """How far the plan is from x*' = f(x*) + B(x*) u*, against what the least tube can bear."""
     x, u = list(curve.x.T), list(curve.u.T)
@@ -205,7 +173,7 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
     )
     if not worst > scale:
         return
-    bearable = nearest(model.rate) * _least_radius(spec) if spec.hardware is None else _bearable(spec)
+    bearable = nearest(model.rate) * least_radius(spec) if spec.hardware is None else _bearable(spec)
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]

@@ -32,7 +32,8 @@ _INSIDE = 0.97  # of the room in the safe set: samples may miss the widest place
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wish:
-    """What is asked of the tube: half-widths `asked` of some states, or else a `width` beyond the start's distance.
+    """What is asked of the tube: half-widths `asked` of some states, or else a `width` beyond the start's distance, of
+    the state that moves farthest.
 
     Those of the states are followed by those of the `outputs` (k, n). A tube that would leave the safe set through a
     state for which nothing is asked is made as much narrower.
@@ -51,10 +52,10 @@ class Wish:
         """How far the start is from the plan's, in z."""
         return float(np.linalg.norm(S @ self.apart) + self.within * np.linalg.norm(S, 2))
 
-    def level(self, around: Array, start: float, centres: Array) -> float:
-        """Dbar, given W at points (K, n, n), the start's distance, and points of the plan (K', n)."""
+    def level(self, around: Array, S: Array, start: float, centres: Array) -> float:
+        """Dbar, given W at points (K, n, n), S, the start's distance, and points of the plan (K', n)."""
         if self.asked is None:
-            return self.width + start
+            return self.width / _reach(S) + start
         n = len(self.box)
         C = np.vstack([np.eye(n), self.outputs])
         widths = np.sqrt(np.max(np.diagonal(C @ around @ C.T, axis1=1, axis2=2), axis=0))
@@ -80,20 +81,39 @@ def propose(model: ControlAffineModel, plan: Plan, wish: Wish) -> tuple[Coordina
         bounds = _spectrum(around, S)
         S = S * sqrt(bounds[0])
         ratio = sqrt(bounds[1] / bounds[0])
-        widths = np.sqrt(np.max(np.diagonal(around, axis1=1, axis2=2), axis=0))
-        level = wish.level(around, ratio * wish.start(S), centres)
+        widths = _widths(around)
+        level = wish.level(around, S, ratio * wish.start(S), centres)
         if all(e.is_constant for row in model.W for e in row):
             break
         around = _values(dual, _samples(centres, S, level, level * widths, wish.box))
         candidates = [around.mean(axis=0), *_values(dual, centres[:: max(1, len(centres) // 4)])]
         S = reduce(partial(_better, around), map(_factor, candidates))
-    S = S * sqrt(_spectrum(around, S)[0])
+    bounds = _spectrum(around, S)
+    S = S * sqrt(bounds[0])
+    if wish.asked is None:
+        widths = _widths(around)
+        level = wish.level(around, S, sqrt(bounds[1] / bounds[0]) * wish.start(S), centres)
     sides = tuple(Fraction(float(side)) for side in level * widths)
     if wish.asked is not None:
         # |z| = 1 at the rim of the tube: Gamma, which has a meaning with P = S'S only, is then the same for c W
         S, level = S / level, 1.0
+    else:
+        S, level = (
+            S * _reach(S),
+            level * _reach(S),
+        )  # |z| bounds every state, whatever the scale of the metric
     coordinates = Coordinates(tuple(tuple(map(_short, row)) for row in S))
     return coordinates, Proposed(rho=_short(level), sides=sides)
+
+
+def _reach(S: Array) -> float:
+    """How far the state that moves farthest is off where |S x| <= 1."""
+    return float(np.linalg.norm(np.linalg.inv(S), axis=1).max())
+
+
+def _widths(duals: Array) -> Array:
+    """Sup sqrt(W_ii) over samples, (n,)."""
+    return np.asarray(np.sqrt(np.max(np.diagonal(duals, axis1=1, axis2=2), axis=0)))
 
 
 def _on_plan(plan: Plan) -> Array:

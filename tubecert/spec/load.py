@@ -50,8 +50,10 @@ from tubecert.spec.tube import (
     EXPECT,
     SLUG,
     TUBE,
+    Tube,
     decides_data,
     expected_data,
+    measured,
     read_expectation,
     read_name,
     read_tube,
@@ -222,6 +224,8 @@ def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None
     found = _read_named(root.reader, entries, system, names, alone=alone)
     if found is None or name is None:
         return None
+    if not (alone or lacks or reads == "system" or "hardware" in entries):
+        found["tube"] = measured(found.get("tube") or Tube(), names.states, dict(found["units"]))
     return Spec(
         name=name,
         path=root.reader.source.file,

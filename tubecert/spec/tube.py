@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar, Final, Literal
 
@@ -23,6 +24,7 @@ WIDTHS: Final = "half_widths"  # ranges by state and output
 
 SLUG: Final = "[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
 _RADIUS: Final = number(above=0, side="below")
+_MANY: Final = 4  # states: a ball of so many is rarely what is meant, or what a metric can fill
 
 
 def read_name(field: Field) -> str | None:
@@ -60,8 +62,9 @@ class Tube:
     """Radius left to the adaptation; > 0. Beside half_widths it may be left out: half of what the start leaves."""
     coordinates: Literal["identity", "auto"] | None = key(word("identity", "auto"), None)
     """What the tube is measured in. identity: the tube is a Euclidean ball of states, and gains depend on their units.
-    auto: it is an ellipsoid of the metric, cut to half-widths, the same in all units; epsilon and rho_a are then
-    lengths in the metric. By default auto beside half_widths, else identity."""
+    auto: it is an ellipsoid of the metric, cut to half-widths: no state is off by more than epsilon + rho_a and what
+    the start takes, and one may be. By default auto beside half_widths, where units of states differ, and with four or
+    more states; else identity."""
     half_widths: tuple[tuple[str, Fraction], ...] = key(
         named("lengths", _RADIUS, "0.1"), (), example={"q": 0.15}
     )
@@ -98,6 +101,14 @@ def read_tube(field: Field, names: Names) -> Tube | None:
         entries["coordinates"].fail(codes.RANGE, message, help)
         return None
     return tube
+
+
+def measured(tube: Tube, states: Sequence[str], units: Mapping[str, str]) -> Tube:
+    """The tube with its coordinates said: a ball is what few states of one unit have by default."""
+    if tube.coordinates is not None or tube.half_widths:
+        return tube
+    known = {units[name] for name in states if name in units}
+    return replace(tube, coordinates=AUTO if len(known) > 1 or len(states) >= _MANY else "identity")
 
 
 def tube_data(tube: Tube, spec: Any) -> dict[str, Any]:

@@ -112,13 +112,10 @@ def asked_half_widths(question: Question) -> tuple[Fraction | None, ...] | None:
 def room_of(metric: ProvenMetric) -> Room:
     """What a plan's defect is measured against: the least tube that there can be, or about that."""
     question = metric.question
-    effort, tube = question.effort, question.spec.tube
-    if (
-        tube.half_widths
-    ):  # |x - x*| < w for the narrowest side; its length in the metric is sqrt(a) w at least
-        return Room(rho=min(width for _, width in tube.half_widths), lower=metric.lower.below, effort=effort)
-    epsilon, rho_a = radii(question)
-    return Room(rho=epsilon + rho_a, lower=1.0 if tube.auto else metric.lower.below, effort=effort)
+    widths = [width for _, width in question.spec.tube.half_widths]
+    # a state that is off by r, the least of what is asked for, is sqrt(a) r away in the metric at least
+    rho = min(widths) if widths else sum(radii(question), Fraction(0))
+    return Room(rho=rho, lower=metric.lower.below, effort=question.effort)
 
 
 def lay(metric: ProvenMetric, proposed: Knots | None = None) -> Planned:

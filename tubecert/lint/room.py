@@ -1,0 +1,125 @@
+"""The tube that is asked for, against the safe set and the start: what is known of it before anything is proven.
+
+A ball is as wide as its radius. In coordinates of its own, and with a constant metric, the half-widths are those of
+(1.7), in floats; with another metric, or none yet, nothing is said of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+
+from tubecert.digits import near
+from tubecert.enclosure.interval import Array
+from tubecert.findings import Finding
+from tubecert.lint import codes
+from tubecert.lint.floats import floats, nearest
+from tubecert.spec import Spec
+
+_ROUNDING = 1e-9
+_BALL = "the tube needs a radius of at least"
+_LESS = "reduce tube.epsilon, tube.rho_a or the initial offset, or enlarge the safe set"
+
+
+def least_radius(spec: Spec) -> float:
+    """No tube of this specification is thinner: epsilon + rho_a + the initial offset (0 where unknown).
+
+    Of half-widths it is the least one, for comparison only: the other states make the tube thinner.
+    """
+    tube = spec.tube
+    if tube.half_widths:
+        return nearest(min(width for _, width in tube.half_widths))
+    return _asked_radius(spec) + (0.0 if spec.within is None else nearest(spec.within))
+
+
+def room_findings(spec: Spec, t: Array, x: Array) -> Iterator[Finding]:
+    """A tube that leaves the safe set around the plan `x` (K, n) at times `t` (K,), or that the start is not in."""
+    if spec.hardware is not None:  # the tube is what is found
+        return
+    offset = _offset(spec, x)
+    if not spec.tube.auto:
+        rho = least_radius(spec) + float(np.linalg.norm(offset))
+        yield from _too_wide(spec, t, x, np.full(len(spec.states), rho), f"{_BALL} {near(rho, 4)}")
+        return
+    W = _constant_metric(spec)
+    if W is None:
+        return
+    widths = np.sqrt(np.diagonal(W))
+    start = math.sqrt(max(0.0, float(offset @ np.linalg.solve(W, offset))))
+    if not spec.tube.half_widths:
+        yield from _too_wide(spec, t, x, (_asked_radius(spec) / widths.max() + start) * widths, "")
+        return
+    asked = np.array([nearest(dict(spec.tube.half_widths).get(name, Fraction(0))) for name in spec.states])
+    level = np.min(asked[asked > 0] / widths[asked > 0], initial=math.inf)
+    if len(spec.tube.half_widths) == np.count_nonzero(asked) and start >= level * (1 + _ROUNDING):
+        yield _outside(spec, offset, level * widths)
+    elif math.isfinite(level):
+        yield from _too_wide(spec, t, x, np.where(asked > 0, level * widths, 0.0), "")
+
+
+def _too_wide(spec: Spec, t: Array, x: Array, sides: Array, radius: str) -> Iterator[Finding]:
+    """Where the tube leaves the safe set by most, against its own width there."""
+    low, high = floats([low for low, _ in spec.safe_set]), floats([high for _, high in spec.safe_set])
+    free = np.minimum(x - low, high - x)
+    k, i = np.unravel_index(int(np.argmax(np.nan_to_num(sides - free, nan=-np.inf))), free.shape)
+    side, room, name = float(sides[i]), float(free[k, i]), spec.states[i]
+    if not math.isfinite(side) or side - room <= _ROUNDING * side:
+        return
+    when = "" if len(t) == 1 else f" at t = {near(t[k], 4)} s"
+    asked = f"tube.half_widths.{name}" if name in dict(spec.tube.half_widths) else ""
+    reaches = (
+        f"{radius} (epsilon + rho_a + initial offset)"
+        if radius
+        else f"the tube reaches {name}* +-{near(side, 4)}"
+    )
+    yield Finding(
+        code=codes.NO_ROOM,
+        message=f"{reaches}, but{when} the plan is only {near(room, 4)} from the {name} side of the safe set",
+        location=spec.location(asked or "tube") or spec.location("safe_set"),
+        help=f"half_widths.{name} of at most {near(room, 4)} fits; or enlarge the safe set"
+        if asked
+        else _LESS,
+    )
+
+
+def _outside(spec: Spec, offset: Array, sides: Array) -> Finding:
+    """That the start is not in the tube, by the state that is farthest off, in its width."""
+    i = int(np.argmax(np.abs(offset) / sides))
+    name, off, side = spec.states[i], float(abs(offset[i])), float(sides[i])
+    beyond = (
+        f", and the tube has {name}* +-{near(side, 4)} there"
+        if off > side
+        else " in a direction in which the tube is thin"
+    )
+    return Finding(
+        code=codes.START_OUTSIDE,
+        message=f"the initial state is outside of the tube: {name} is {near(off, 4)} from the plan's{beyond}",
+        location=spec.location("initial_state") or spec.location("trajectory"),
+        help="start nearer to the plan, or ask for larger half-widths",
+    )
+
+
+def _asked_radius(spec: Spec) -> float:
+    return nearest((spec.tube.epsilon or Fraction(0)) + (spec.tube.rho_a or Fraction(0)))
+
+
+def _offset(spec: Spec, x: Array) -> Array:
+    """How far the start is from the plan's, by state: of a box its farthest corner; 0 where it is not said."""
+    if spec.within is not None or spec.trajectory.task is not None:
+        return np.zeros(len(spec.states))
+    spread = floats([(high - low) / 2 for low, high in spec.start_box] or [Fraction(0)] * len(spec.x0))
+    away = floats(spec.x0) - x[0]
+    return np.asarray(away + np.where(away < 0, -spread, spread))
+
+
+def _constant_metric(spec: Spec) -> Array | None:
+    """W, if there is one that does not move and is positive definite."""
+    terms = () if spec.metric is None else spec.metric.dual_metric
+    entries = [term.expression for row in terms for term in row]
+    if not entries or not all(entry.is_constant for entry in entries):
+        return None
+    W = floats([entry.fraction for entry in entries]).reshape(len(terms), -1)
+    return W if np.isfinite(W).all() and np.linalg.eigvalsh(W)[0] > 0 else None
