@@ -43,7 +43,8 @@ class FormError(ValueError):
 class Tagged:
     """Base of a family of records that are told apart by a member named `key`: the `tag` of the class.
 
-    A direct subclass is a family; its subclasses are the members, each with a tag of its own.
+    A direct subclass is a family; its subclasses are the members, each with a tag of its own: its name with underscores
+    (`OtherMetric`: `other_metric`), where it does not say another.
     """
 
     __slots__ = ()
@@ -55,7 +56,8 @@ class Tagged:
         super().__init_subclass__()
         if Tagged in cls.__bases__:
             cls.family = {}
-        elif cls.tag:
+        else:
+            cls.tag = cls.__dict__.get("tag") or re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
             cls.family[cls.tag] = cls
 
 

@@ -279,9 +279,9 @@ def test_bad_metric_files(folder, unused, content, said):
 @pytest.mark.parametrize(
     ("change", "claim"),
     [
-        ({"rate": 5}, "metric, C2"),
-        ({"dual_metric": [["1", "0", "x3"], ["0", "1", "0"], ["x3", "0", "2"]]}, "metric, C3"),
-        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["0", "0", "-1"]]}, "metric, C1"),
+        ({"rate": 5}, "metric, contraction"),
+        ({"dual_metric": [["1", "0", "x3"], ["0", "1", "0"], ["x3", "0", "2"]]}, "metric, inputs"),
+        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["0", "0", "-1"]]}, "metric, definiteness"),
     ],
 )
 def test_a_metric_file_is_verified(folder, change, claim):
@@ -415,7 +415,7 @@ def test_a_real_refusal(folder):
     file.write_text(replaced("rate: 0.9999", "rate: 1"), encoding="utf-8")
     result = run("certify", file)
     assert result.exit_code == 1
-    assert result.stdout.startswith("refuted three_state: metric, C2: ")
+    assert result.stdout.startswith("refuted three_state: metric, contraction: C2 ")
     assert "the largest rate that this metric supports is 0.9999" in " ".join(result.stdout.split())
     reason = json.loads((folder / "fast.certificate.json").read_text(encoding="utf-8"))["result"]["reasons"][
         0

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 import tubecert
+from tubecert.claims.conditions import SAYS, SECTIONS
 from tubecert.kinds import NAMES, RATES
 from tubecert.report.figures_gains import STYLES
 from tubecert.report.page_trust import CLAIMS
-from tubecert.words.conditions import SAYS, SECTIONS
 
 PACKAGE = Path(tubecert.__file__).parent
 KEYS = [name.key for name in NAMES]

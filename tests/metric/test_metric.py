@@ -31,7 +31,6 @@ from tubecert.expression import constant, substitute
 from tubecert.metric import verify
 from tubecert.metric.verify import verify_metric
 from tubecert.verdict import Verdict
-from tubecert.words.claims import message
 
 EFFORT = Effort()
 
@@ -79,7 +78,7 @@ def has_a_positive_direction(m):
 
 def why(proof):
     """What a proof says that failed."""
-    return message(Reason(claim=proof.failed, verdict=Verdict(proof.verdict)))
+    return Reason(claim=proof.failed, verdict=Verdict(proof.verdict)).message
 
 
 def assert_witness(model, proof, rate, box):

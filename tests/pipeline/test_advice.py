@@ -1,7 +1,7 @@
 """What would help, in words."""
 
 from tubecert.claims.advice import HalveConstant
-from tubecert.words.advice import advice as words
+from tubecert.claims.advice import advice as words
 
 
 def test_the_users_own_h_is_named_beside_the_constant_that_bounds_it():

@@ -34,7 +34,6 @@ from tubecert.report import html, markdown
 from tubecert.report.certificate_page import page_of
 from tubecert.report.figures_axes import Axis, _hexagon, number
 from tubecert.spec import load, load_text
-from tubecert.words.assumptions import assumed
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "configs"
@@ -88,7 +87,7 @@ def any_certificate(request):
 
 def assumption(item):
     """An assumption of the JSON in words."""
-    return assumed(from_json(Assumption, item, "assumption"))
+    return from_json(Assumption, item, "assumption").told()
 
 
 def told(sealed):

@@ -91,7 +91,7 @@ def test_what_is_claimed_comes_first_then_the_start_the_tube_and_the_gains():
 def test_a_refusal_names_claim_witness_and_remedy():
     text = shown(refuted_metric(), width=120)
     first, *rest = text.splitlines()
-    assert first.startswith("refuted pendulum: metric, C2: ")
+    assert first.startswith("refuted pendulum: metric, contraction: C2 fails at rate ")
     assert "the largest rate that this metric supports is 0.99654" in first
     assert any(row.split() == ["at", "angle", "=", "0.1,", "speed", "=", "-0.25"] for row in rest)
     assert any(" ".join(row.split()).startswith("help lower metric.rate to 0.99654") for row in rest)
@@ -101,7 +101,7 @@ def test_a_refusal_names_claim_witness_and_remedy():
 def test_failing_gains_refute_no_tube():
     text = " ".join(shown(refuted_gains()).split())
     assert text.startswith(
-        "refuted pendulum: A (26a): the initial error and the filter's share must fit into rho_r: its margin lies in"
+        "refuted pendulum: A (26a): the initial error and the filter's share must fit into rho_r: it needs "
     )
     assert "does not prove that the state leaves the tube" in text
     assert "stays in the tube" not in text

@@ -8,12 +8,13 @@ import pytest
 from systems import SMALL
 
 from tubecert.certificate.result import Certificate
+from tubecert.claims.conditions import SECTIONS
 from tubecert.kinds import NAMES
 from tubecert.report import pages, text
 from tubecert.report.certificate_page import page_of
+from tubecert.report.gains import ROLES
 from tubecert.report.terminal import Terminal
 from tubecert.verdict import Verdict
-from tubecert.words.conditions import ROLES, SECTIONS
 
 PLANT = """
 tubecert: 1

@@ -88,7 +88,7 @@ def test_without_a_tube_there_is_nothing_to_simulate(verdict, code):
     stopped = replace(result, verdict=Verdict(verdict), reasons=(reason,), tube=None)
     error, finding = refused(require_tube, stopped)
     assert error.exit_code == code
-    assert "metric, C1: W " in finding.message
+    assert "metric, definiteness: W " in finding.message
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import Field, dataclass, field, fields
 from typing import Literal
 
+from tubecert.claims import family
 from tubecert.enclosure.constant import Constant, Witness
 
 Side = Literal["below", "above"]
@@ -204,6 +205,7 @@ DERIVED: dict[str, Meaning] = {
 
 
 EVERY: dict[str, Meaning] = {**TABLE, **WIND, **DERIVED}
+family.name({name: (own.symbol, own.words) for name, own in EVERY.items()})  # claims stand below constants
 
 
 def meaning(name: str) -> Meaning:

@@ -8,7 +8,10 @@ from fractions import Fraction
 from math import isfinite
 
 from tubecert.certificate.result import Result
+from tubecert.claims.advice import advice
+from tubecert.claims.conditions import SECTIONS
 from tubecert.claims.family import Reason
+from tubecert.claims.limits import input_title
 from tubecert.claims.metric import METRIC_CLAIMS, MetricFound
 from tubecert.digits import near
 from tubecert.enclosure.constant import Constant
@@ -18,9 +21,6 @@ from tubecert.pipeline.verification import Verified
 from tubecert.spec import Spec
 from tubecert.spec.tube import METRICS, WIDTHS
 from tubecert.verdict import Verdict
-from tubecert.words.advice import advice
-from tubecert.words.claims import input_title, message, title
-from tubecert.words.conditions import SECTIONS
 
 VERDICT_MISMATCH = "TC502"
 RANGE_MISMATCH = "TC503"
@@ -106,9 +106,9 @@ def outcome_of_metric(found: Verified) -> Outcome:
 
 def _claim(reason: Reason, h: Sequence[str] = ()) -> Claim:
     return Claim(
-        name=title(reason.claim),
+        name=reason.claim.title,
         verdict=reason.verdict,
-        message=message(reason),
+        message=reason.message,
         relax=advice(reason.relax, h),
     )
 

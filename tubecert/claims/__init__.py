@@ -1,12 +1,13 @@
-"""What can be claimed, assumed and advised: ids with parameters, never sentences. `words` makes sentences of them.
+"""What can be claimed, assumed and advised: ids with parameters, and beside them what each says in words.
 
 In: what a room found. Out: `Reason`s and `Assumption`s, as they stand in a certificate. The ids and the names of the
-parameters are a contract: a reader of certificates decides by them. Trusted: yes.
+parameters are a contract: a reader of certificates decides by them, never by a sentence. Trusted: yes.
 
 | module | what it holds |
 |---|---|
 | `family` | what a claim, an advice, an assumption and a reason are |
 | `metric`, `tube`, `bounds`, `gains`, `limits` | claims, in the order in which a certification meets them |
+| `conditions` | what the conditions of certificates are called and say |
 | `failures`, `outcomes` | why no metric was found, and what became of each attempt |
 | `advice` | what would help |
 | `assumptions` | what is assumed |

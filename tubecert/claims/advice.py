@@ -1,36 +1,37 @@
-"""What would help."""
+"""What would help: what changes a number, what can be done, and last what is wrong with the plan."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar, Literal
+from typing import ClassVar, Final, Literal
 
-from tubecert.claims.family import Relax, Side
+from tubecert.claims.family import CONSTANTS, Relax, Said, Side
+from tubecert.digits import down, near, up
 from tubecert.records import Tagged
+
+_OF_H: Final = ("h", "h_x", "h_t")
+_LONGEST: Final = 60  # characters of h
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HalveConstant(Relax):
     """With the constant halved, the least Gamma is `factor` times what it is."""
 
-    tag: ClassVar[str] = "halve_constant"
     constant: str
     factor: float
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MendPlan(Relax):
-    """The plan misses x' = f + B u by up to `defect` (at t, if known), which alone takes `share` of the tube."""
-
-    tag: ClassVar[str] = "mend_plan"
-    defect: float
-    share: float
-    remedy: PlanRemedy
-    t: float | None = None
+    def of(self, h: Sequence[str]) -> str:
+        """What it would lower, and by how much; with the expressions of h, if they are given."""
+        symbol, words = CONSTANTS[self.constant]
+        whole = h[0] if len(h) == 1 else f"[{', '.join(h)}]"
+        shown = whole if len(whole) <= _LONGEST else f"{whole[:_LONGEST]} ..."
+        told, share = f"{words}, h = {shown}" if h else words, 100 * (1 - self.factor)
+        return f"halving {symbol} ({told}) would lower the least Gamma by {share:.0f} %"
 
 
-class PlanRemedy(Tagged):
+class PlanRemedy(Said, Tagged):
     """What would lower the defect of a plan."""
 
     __slots__ = ()
@@ -40,165 +41,235 @@ class PlanRemedy(Tagged):
 class CorrectPlan(PlanRemedy):
     """Correct the expressions."""
 
-    tag: ClassVar[str] = "correct_plan"
+    says: ClassVar[str] = "correct x or u there"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherInterpolation(PlanRemedy):
     """With another interpolation of the inputs the defect would be `defect`."""
 
-    tag: ClassVar[str] = "other_interpolation"
     interpolation: Literal["hold", "linear"]
     defect: float
+
+    def _told(self) -> str:
+        return f"with interpolation: {self.interpolation} it would be {near(self.defect, 3)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoreKnots(PlanRemedy):
     """Give more knots, or integrate the dynamics between them."""
 
-    tag: ClassVar[str] = "more_knots"
+    says: ClassVar[str] = "give more knots, or integrate the dynamics between them"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MendPlan(Relax):
+    """The plan misses x' = f + B u by up to `defect` (at t, if known), which alone takes `share` of the tube."""
+
+    defect: float
+    share: float
+    remedy: PlanRemedy
+    t: float | None = None
+
+    def _told(self) -> str:
+        where = "" if self.t is None else f" (at t = {near(self.t, 4)} s)"
+        misses = f"the plan misses x' = f + B u by up to {near(self.defect, 3)}{where}"
+        share = 100 * self.share
+        part = f"{near(share, 2)} % of" if share <= 1000 else f"{near(self.share, 2)} times"
+        return f"{misses}, which alone takes {part} the tube: {self.remedy.told()}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RaiseBudget(Relax):
     """A larger budget of boxes may decide it; `proof`: a proof of a synthesis ran out of it."""
 
-    tag: ClassVar[str] = "raise_budget"
     proof: bool = False
+
+    def _told(self) -> str:
+        return "raise --budget" + (": a proof ran out of boxes" if self.proof else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShrinkTube(Relax):
     """A smaller tube."""
 
-    tag: ClassVar[str] = "shrink_tube"
+    says: ClassVar[str] = "shrink the tube"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReduceRadii(Relax):
     """Smaller epsilon, rho_a or initial error."""
 
-    tag: ClassVar[str] = "reduce_radii"
+    says: ClassVar[str] = "reduce epsilon, rho_a or the initial error"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeavePlanRoom(Relax):
     """A plan with more room between its inputs and their limits."""
 
-    tag: ClassVar[str] = "leave_plan_room"
+    says: ClassVar[str] = "plan with more room to the limits"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReduceInitialError(Relax):
     """A start nearer to the plan."""
 
-    tag: ClassVar[str] = "reduce_initial_error"
+    says: ClassVar[str] = "reduce the initial error"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnlargeSafeSet(Relax):
     """A larger safe set."""
 
-    tag: ClassVar[str] = "enlarge_safe_set"
+    says: ClassVar[str] = "enlarge the safe set"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShrinkSafeSet(Relax):
     """A smaller safe set: to `factor` of its size about its centre, where `rate` works, if that is known."""
 
-    tag: ClassVar[str] = "shrink_safe_set"
     factor: float | None = None
     rate: Fraction | None = None
+
+    def _told(self) -> str:
+        if self.factor is None or self.rate is None:
+            return "shrink the safe set"
+        shrunk = f"the safe set shrunk to {near(self.factor, 3)} of its size about its centre"
+        return f"{shrunk}, where {near(self.rate)} works"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LowerRate(Relax):
     """A lower rate of the metric: `to` that one, where it is known to be supported."""
 
-    tag: ClassVar[str] = "lower_rate"
     to: float | None = None
+
+    def _told(self) -> str:
+        return "lower the rate" if self.to is None else f"lower metric.rate to {down(self.to, 6)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherMetric(Relax):
     """Another dual metric."""
 
-    tag: ClassVar[str] = "other_metric"
+    says: ClassVar[str] = "give another dual metric"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeclareMetricBound(Relax):
     """A bound of M that holds."""
 
-    tag: ClassVar[str] = "declare_metric_bound"
     side: Side | None = None
     value: float | None = None
+
+    def _told(self) -> str:
+        if self.side is None or self.value is None:
+            return "declare metric.bounds"
+        rounded = down if self.side == "lower" else up
+        return f"declare {self.side}: {rounded(self.value, 6)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeclareUncertaintyBound(Relax):
     """A bound of the uncertainty that holds."""
 
-    tag: ClassVar[str] = "declare_uncertainty_bound"
     constant: str
     value: float | None
+
+    def _told(self) -> str:
+        return f"declare {self.constant}: {'-' if self.value is None else up(self.value, 6)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AskForRateBelow(Relax):
     """Ask for a rate below `rate`."""
 
-    tag: ClassVar[str] = "ask_for_rate_below"
     rate: Fraction
+
+    def _told(self) -> str:
+        return f"ask for a rate below {near(self.rate)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AskForRateUpTo(Relax):
     """`rate` works on this safe set."""
 
-    tag: ClassVar[str] = "ask_for_rate_up_to"
     rate: Fraction
+
+    def _told(self) -> str:
+        return f"a rate up to {near(self.rate)}, which works on this box"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GiveInput(Relax):
     """The mode needs an input."""
 
-    tag: ClassVar[str] = "give_input"
+    says: ClassVar[str] = "give it an input"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherVariables(Relax):
     """Other variables of W, or none asked for."""
 
-    tag: ClassVar[str] = "other_variables"
+    says: ClassVar[str] = "choose other variables, or leave them to tubecert"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LowerDegree(Relax):
     """A lower degree of W."""
 
-    tag: ClassVar[str] = "lower_degree"
+    says: ClassVar[str] = "ask for a lower degree"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConstantInputs(Relax):
     """Inputs in which B is constant, such as the accelerations of joints."""
 
-    tag: ClassVar[str] = "constant_inputs"
+    says: ClassVar[str] = (
+        "choose inputs in which B is constant, such as the accelerations of joints (tubecert init --template arm2 "
+        "shows how)"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HigherDegree(Relax):
     """A degree of W above `degree`, or none asked for."""
 
-    tag: ClassVar[str] = "higher_degree"
     degree: int
+
+    def _told(self) -> str:
+        return f"a degree above {self.degree}, or auto"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RaiseConditionNumber(Relax):
     """A higher limit of the condition number."""
 
-    tag: ClassVar[str] = "raise_condition_number"
     to: float
+
+    def _told(self) -> str:
+        return f"raise condition_number to {near(self.to, 4)}"
+
+
+def advice(items: Sequence[Relax], h: Sequence[str] = ()) -> str:
+    """What would help; empty if nothing is known to. `h`: the expressions of the uncertainty, as they are written."""
+    halves = [item for item in items if isinstance(item, HalveConstant)]
+    about_h = next((item for item in halves if item.constant in _OF_H), None)
+    halvings = ", ".join(item.of(h if item is about_h else ()) for item in halves)
+    plans = [item.told() for item in items if isinstance(item, MendPlan)]
+    others = [item for item in items if not isinstance(item, (HalveConstant, MendPlan))]
+    return "; ".join(filter(None, (halvings, _alternatives(others), *plans)))
+
+
+def _alternatives(items: Sequence[Relax]) -> str:
+    tried = [item.told() for item in items if _is_tried(item)]
+    if tried:
+        return f"try {'; or '.join(tried)}"
+    said = [item.told() for item in items]
+    return ", or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
+
+
+def _is_tried(item: Relax) -> bool:
+    """Whether it is told what is known to work."""
+    known = isinstance(item, ShrinkSafeSet) and item.factor is not None
+    return known or isinstance(item, (HigherDegree, AskForRateUpTo))

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import ClassVar, Literal
 
 from tubecert.claims.family import Assumption
+from tubecert.digits import down, near, up
 from tubecert.enclosure.constant import Constant
 
 
@@ -14,14 +15,21 @@ from tubecert.enclosure.constant import Constant
 class LeastFeedback(Assumption):
     """The feedback is the least k of the quadratic program, evaluated in continuous time and exactly."""
 
-    tag: ClassVar[str] = "least_feedback"
+    says: ClassVar[str] = (
+        "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, section 0); the "
+        "controller acts in continuous time and exactly, evaluates f(x*) + B(x*) u* itself and never the derivative "
+        "of a stored plan"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StraightGeodesics(Assumption):
     """Nothing, really: the metric is constant, its geodesics are straight and unique."""
 
-    tag: ClassVar[str] = "straight_geodesics"
+    says: ClassVar[str] = (
+        "the controller takes the straight line for the minimising geodesic; where the metric is constant, as here, it "
+        "is the only one"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,75 +39,96 @@ class ExactGeodesics(Assumption):
     `uniqueness`: proven, with `value` = G rho + L_G rho^2/8 < 1; else assumed, `value` once it is known.
     """
 
-    tag: ClassVar[str] = "exact_geodesics"
     uniqueness: Literal["proven", "assumed"]
     value: Constant | None = None
+
+    def _told(self) -> str:
+        exact = "the controller finds the minimising geodesic exactly"
+        if self.value is None:
+            return f"{exact}, and it is unique in the tube (not proven here)"
+        if self.uniqueness == "proven":
+            most = up(self.value.above, 6)
+            return f"{exact}; it is unique in the tube: proven, G rho + L_G rho^2/8 <= {most}"
+        size = f"reaches {down(self.value.below, 6)}"
+        if self.value.below < 1:
+            size = "could not be bounded by less than 1"
+        return f"{exact}, and it is unique in the tube (not proven: G rho + L_G rho^2/8 {size})"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartAtRest(Assumption):
-    """xhat(0) = x(0), u_a(0) = 0, and sigma_hat(0) lies in the projection's ball."""
+    """The predictor, the filter and the estimate start as the theorems have it."""
 
-    tag: ClassVar[str] = "start_at_rest"
+    says: ClassVar[str] = (
+        "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HardProjection(Assumption):
     """The projection is hard."""
 
-    tag: ClassVar[str] = "hard_projection"
+    says: ClassVar[str] = "the projection is hard"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SmoothProjection(Assumption):
     """The projection is smooth with this layer."""
 
-    tag: ClassVar[str] = "smooth_projection"
     layer: Fraction
+
+    def _told(self) -> str:
+        return f"the projection is smooth with layer {near(self.layer)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PerfectState(Assumption):
-    """The full state is measured without noise or delay, and inputs do not saturate."""
+    """Measurement and actuation are ideal."""
 
-    tag: ClassVar[str] = "perfect_state"
+    says: ClassVar[str] = "the full state is measured without noise or delay, and inputs do not saturate"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirstOrderFilter(Assumption):
-    """C(s) = omega/(s + omega)."""
+    """The low-pass filter of the adaptation."""
 
-    tag: ClassVar[str] = "first_order_filter"
+    says: ClassVar[str] = "the filter is first order, C(s) = omega/(s + omega)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForAllTime(Assumption):
-    """The claim is for all t >= 0."""
+    """There is no end of time."""
 
-    tag: ClassVar[str] = "for_all_time"
+    says: ClassVar[str] = "the claim is for all t >= 0"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UpToHorizon(Assumption):
     """The claim is for 0 <= t <= `horizon`, in s."""
 
-    tag: ClassVar[str] = "up_to_horizon"
     horizon: Fraction
+
+    def _told(self) -> str:
+        return f"the claim is for 0 <= t <= {near(self.horizon)} s"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UncertaintyAsDeclared(Assumption):
-    """The uncertainty obeys its declared bounds on the tube."""
+    """Bounds of the uncertainty are believed."""
 
-    tag: ClassVar[str] = "uncertainty_as_declared"
+    says: ClassVar[str] = "the uncertainty obeys its declared bounds on the tube"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UncertaintyAsGiven(Assumption):
     """The uncertainty is the expression of the specification, or any other within the certificate's h, h_x, h_t."""
 
-    tag: ClassVar[str] = "uncertainty_as_given"
     any_within_bounds: bool
+
+    def _told(self) -> str:
+        others = ", or any other within the bounds h, h_x, h_t of this certificate"
+        given = "the uncertainty is the expression of the specification"
+        return given + (others if self.any_within_bounds else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,13 +138,20 @@ class WindWithin(Assumption):
     `rate` bounds |w'|, in 1/s, where that is known.
     """
 
-    tag: ClassVar[str] = "wind_within"
     bound: Fraction
     rate: Fraction | None = None
+
+    def _told(self) -> str:
+        rate = "" if self.rate is None else f", |dw/dt| <= {near(self.rate)} 1/s"
+        wind = f"a wind acts as E(x) w beside the inputs, |w| <= {near(self.bound)}{rate}"
+        return f"{wind}, and is otherwise arbitrary"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParametersWithin(Assumption):
     """The parameters of the claim are constant, anywhere in their ranges; the controller knows f, B at the middles."""
 
-    tag: ClassVar[str] = "parameters_within"
+    says: ClassVar[str] = (
+        "the parameters that are known by ranges are constant and lie in them; predictor, feedback and plan are those "
+        "of f and B at the middles of the ranges"
+    )

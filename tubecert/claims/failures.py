@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from tubecert.claims.family import Claim
+from tubecert.claims.family import Claim, Reason
 from tubecert.claims.outcomes import Outcome
+from tubecert.digits import near
 from tubecert.records import Tagged
+from tubecert.spec.codes import CODES
 from tubecert.verdict import Verdict
 
 
@@ -17,6 +19,19 @@ class Failure(Tagged):
 
     __slots__ = ()
 
+    def told(self, reason: Reason) -> str:
+        """Why, in one sentence; `reason` is that of the claim that there is a metric."""
+        return self._told(reason)
+
+    def _told(self, reason: Reason) -> str:
+        raise NotImplementedError
+
+
+def rank(reason: Reason) -> str:
+    """What is known of the rank of B."""
+    refuted = reason.verdict is Verdict.REFUTED
+    return "B loses rank in the safe set" if refuted else "B could not be proven of full rank"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RankUnproven(Failure):
@@ -24,66 +39,91 @@ class RankUnproven(Failure):
 
     tag: ClassVar[str] = "rank_of_B"
 
+    def _told(self, reason: Reason) -> str:
+        return rank(reason)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UncontrollableMode(Failure):
     """A mode of the linearisation at the witness that no input reaches: no metric has a rate above `limit`, in 1/s."""
 
-    tag: ClassVar[str] = "uncontrollable_mode"
     mode: tuple[float, float]
     limit: Fraction
+
+    def _told(self, reason: Reason) -> str:
+        real, imaginary = self.mode
+        pair = f" +- {near(abs(imaginary))}i" if abs(imaginary) > 1e-9 else ""
+        mode = f"the linearisation at an equilibrium has the uncontrollable mode {near(real)}{pair}"
+        return f"{mode}: no metric has a rate above {near(self.limit, 12)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VariableForbidden(Failure):
     """C3 forbids that W depends on `variable`; it may depend on those `permitted`."""
 
-    tag: ClassVar[str] = "variable_forbidden"
     variable: str
     permitted: tuple[str, ...]
+
+    def _told(self, reason: Reason) -> str:
+        permitted = ", ".join(self.permitted) or "nothing"
+        return f"W cannot depend on {self.variable}: C3 (the Killing condition) permits {permitted}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoFrame(Failure):
     """No frame of vector fields that commute with the columns of B was found."""
 
-    tag: ClassVar[str] = "no_frame"
+    def _told(self, reason: Reason) -> str:
+        return "no frame of vector fields that commute with the columns of B was found"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NotWritable(Failure):
     """The metric is beyond what a specification can hold; `code` is that of the finding."""
 
-    tag: ClassVar[str] = "not_writable"
     code: str
+
+    def _told(self, reason: Reason) -> str:
+        return f"the metric cannot be written: {CODES[self.code]}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NotProvenAsWritten(Failure):
     """The metric, read back as written, could not be proven; `condition` is the claim that failed."""
 
-    tag: ClassVar[str] = "not_proven_as_written"
     condition: Claim
+
+    def _told(self, reason: Reason) -> str:
+        return f"the metric as written could not be proven: {self.condition.why(reason)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionNumber(Failure):
     """The least condition number found at `rate` is above the limit that was given."""
 
-    tag: ClassVar[str] = "condition_number"
     rate: Fraction
     condition_number: float
+
+    def _told(self, reason: Reason) -> str:
+        number = near(self.condition_number, 5)
+        return f"the least condition number found at rate {near(self.rate)} is {number}, above the limit"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NothingFound(Failure):
     """No attempt led to a metric; the attempts stand in `result.synthesis`."""
 
-    tag: ClassVar[str] = "nothing_found"
     attempts: int
     routes: tuple[str, ...]
     degrees: tuple[int, ...]
     last: Outcome | None
+
+    def _told(self, reason: Reason) -> str:
+        if not self.attempts:
+            return "no metric was found"
+        degrees, routes = ", ".join(map(str, self.degrees)), " and ".join(self.routes)
+        last = "" if self.last is None else f"; the last: {self.last.told()}"
+        return f"no metric was found: {self.attempts} attempts by {routes}, degree {degrees}{last}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +133,6 @@ class NoneCertified(Failure):
     `slow` and `fast` are the claims that ended the certifications with the slowest and the fastest.
     """
 
-    tag: ClassVar[str] = "none_certified"
     compared: int
     slowest: Fraction
     fastest: Fraction
@@ -101,3 +140,14 @@ class NoneCertified(Failure):
     slow_verdict: Verdict
     fast: Claim
     fast_verdict: Verdict
+
+    def _told(self, reason: Reason) -> str:
+        slowest, fastest = near(self.slowest), near(self.fastest)
+        slow = Reason(claim=self.slow, verdict=self.slow_verdict).message
+        fast = Reason(claim=self.fast, verdict=self.fast_verdict).message
+        if self.compared == 1:
+            return f"the metric at rate {slowest} 1/s does not certify: {slow}"
+        rates = f"none of {self.compared} metrics, of rates from {slowest} to {fastest} 1/s, certifies"
+        return (
+            f"{rates}: {slow}" if slow == fast else f"{rates}: at the slowest {slow}; at the fastest {fast}"
+        )

@@ -1,7 +1,11 @@
-"""What a claim, an advice and an assumption are; a reason is a claim with what is known of it."""
+"""What a claim, an advice and an assumption are; a reason is a claim with what is known of it.
+
+Each is one class: what it holds, and beside it what it says, in a sentence that nothing reads again.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -10,23 +14,56 @@ from tubecert.records import INLINE, Tagged
 from tubecert.verdict import Verdict
 
 Side = Literal["lower", "upper"]
+CONSTANTS: dict[
+    str, tuple[str, str]
+] = {}  # symbol and words of each: `bounds.meanings` says what they are called
 
 
 class Claim(Tagged):
-    """Something that is proven, refuted or left undecided."""
+    """Something that is proven, refuted or left undecided; `name` is what it is called."""
 
     __slots__ = ()
     key: ClassVar[str] = "claim"
+    name: ClassVar[str] = ""
+
+    @property
+    def title(self) -> str:
+        """What it is called, in the words of the table of gains."""
+        return self._title()
+
+    def why(self, reason: Reason) -> str:
+        """Why it holds or not, in one sentence."""
+        return self._why(reason)
+
+    def _title(self) -> str:
+        return self.name
+
+    def _why(self, reason: Reason) -> str:
+        raise NotImplementedError
 
 
-class Relax(Tagged):
-    """Something that would help."""
+class Said:
+    """Something that says one thing: `says`, or what a member makes of its parameters."""
+
+    __slots__ = ()
+    says: ClassVar[str] = ""
+
+    def told(self) -> str:
+        """What it says."""
+        return self._told()
+
+    def _told(self) -> str:
+        return self.says
+
+
+class Relax(Said, Tagged):
+    """Something that would help; it says what to do."""
 
     __slots__ = ()
 
 
-class Assumption(Tagged):
-    """Something that is not proven here and that the certificate rests on."""
+class Assumption(Said, Tagged):
+    """Something that is not proven here and that the certificate rests on; it says what is assumed."""
 
     __slots__ = ()
 
@@ -39,3 +76,18 @@ class Reason:
     verdict: Verdict
     at: Witness | None = None
     relax: tuple[Relax, ...] = ()
+
+    @property
+    def message(self) -> str:
+        """Why it holds or not, in one sentence."""
+        return self.claim.why(self)
+
+    @property
+    def sentence(self) -> str:
+        """The claim and why it holds or not."""
+        return f"{self.claim.title}: {self.message}"
+
+
+def name(constants: Mapping[str, tuple[str, str]]) -> None:
+    """What constants are called, symbol and words, by their names in a certificate."""
+    CONSTANTS.update(constants)

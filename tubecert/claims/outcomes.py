@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from tubecert.claims.family import Claim
+from tubecert.claims.family import Claim, Reason, Said
 from tubecert.records import Tagged
 from tubecert.verdict import Verdict
 
 
-class Outcome(Tagged):
+class Outcome(Said, Tagged):
     """What a route came to; all but `Proven` are why there is no metric by it."""
 
     __slots__ = ()
@@ -20,39 +20,47 @@ class Outcome(Tagged):
 class Proven(Outcome):
     """A metric, proven."""
 
-    tag: ClassVar[str] = "proven"
+    says: ClassVar[str] = "proven"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoProposal(Outcome):
     """The route proposed nothing; `status` is what its solver said."""
 
-    tag: ClassVar[str] = "no_proposal"
     route: str
     status: str
+
+    def _told(self) -> str:
+        return f"{self.route}: {self.status}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrongShape(Outcome):
     """The route proposed coefficients of a wrong shape."""
 
-    tag: ClassVar[str] = "wrong_shape"
     route: str
+
+    def _told(self) -> str:
+        return f"{self.route} gave coefficients of a wrong shape"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NotProven(Outcome):
     """The proposal, rounded, could not be proven, or is refuted: `condition` failed."""
 
-    tag: ClassVar[str] = "not_proven"
     route: str
     condition: Claim
     verdict: Verdict
+
+    def _told(self) -> str:
+        return f"{self.route}: {Reason(claim=self.condition, verdict=self.verdict).message}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionUnbounded(Outcome):
     """The condition number of what was proposed could not be bounded."""
 
-    tag: ClassVar[str] = "condition_unbounded"
     route: str
+
+    def _told(self) -> str:
+        return f"{self.route}: the condition number could not be bounded"

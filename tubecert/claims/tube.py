@@ -6,31 +6,54 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar, Literal
 
-from tubecert.claims.family import Claim, Side
+from tubecert.claims.family import Claim, Reason, Side
+from tubecert.digits import near
+from tubecert.verdict import Verdict
+
+_IN_SAFE_SET = "assumption 1: the tube lies in the safe set"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TubeRadius(Claim):
     """There is a rho >= sqrt(A/a)|x0* - x0| + eps + rho_a with a, A of the tube itself; `obstacle` says why not."""
 
-    tag: ClassVar[str] = "tube_radius"
+    name: ClassVar[str] = "radius of the tube"
     obstacle: Literal["out_of_range", "metric_unbounded", "not_settled"]
     radius: Fraction
+
+    def _why(self, reason: Reason) -> str:
+        rho = "rho = sqrt(A/a)|x0* - x0| + eps + rho_a"
+        match self.obstacle:
+            case "out_of_range":
+                return f"{rho} is beyond the range of numbers"
+            case "metric_unbounded":
+                return "the metric could not be bounded over the tube"
+            case "not_settled":
+                return f"{rho} did not settle: it grows with the tube beyond {near(self.radius)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanBounded(Claim):
     """The curve between the knots of the plan can be bounded."""
 
-    tag: ClassVar[str] = "plan_bounded"
+    name: ClassVar[str] = _IN_SAFE_SET
+
+    def _why(self, reason: Reason) -> str:
+        return "the curve between the plan's knots could not be bounded: two of its times may nearly coincide"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TubeInSafeSet(Claim):
     """Assumption 1; the tube of `radius` leaves through the bound of `state` on `side`, by `excess`."""
 
-    tag: ClassVar[str] = "tube_in_safe_set"
+    name: ClassVar[str] = _IN_SAFE_SET
     radius: Fraction
     state: str
     side: Side
     excess: float
+
+    def _why(self, reason: Reason) -> str:
+        lies = "leaves" if reason.verdict is Verdict.REFUTED else "could not be proven to stay in"
+        when = "" if reason.at is None or reason.at.t is None else f", at t = {near(reason.at.t)}"
+        excess = f", by {near(self.excess, 3)}" if self.excess > 0 else ""
+        return f"the tube {lies} the safe set through the {self.side} bound of {self.state}{excess}{when}"

@@ -67,10 +67,8 @@ class Search:
 
     def __call__(self, so_far: Synthesised) -> None:
         """What there is."""
-        from tubecert.words.claims import outcome
-
         for attempt in so_far.attempts[self.attempts :]:
-            found(f"rate {short(attempt.rate, 4)}, degree {attempt.degree}: {outcome(attempt.outcome)}")
+            found(f"rate {short(attempt.rate, 4)}, degree {attempt.degree}: {attempt.outcome.told()}")
         self.attempts = len(so_far.attempts)
         for row in so_far.rows:
             if (key := (row.rate, row.floor, row.degree)) not in self.rows:
@@ -88,14 +86,12 @@ def kept(will: Callable[[Synthesised], keeper.Will | None]) -> Search | None:
 
 def _judged(row: Row) -> str:
     """A metric, and what a certification with it came to."""
-    from tubecert.words.claims import sentence
-
     words = f"metric of rate {exact(row.rate)}, degree {row.degree}"
     if row.verdict is None:
         return words
     if row.claim is None:
         return f"{words}: {row.verdict}"
-    return f"{words}: {row.verdict}, {sentence(Reason(claim=row.claim, verdict=row.verdict))}"
+    return f"{words}: {row.verdict}, {Reason(claim=row.claim, verdict=row.verdict).sentence}"
 
 
 def warn_of_size(system: Spec, terminal: Terminal, output: Output) -> None:

@@ -25,7 +25,6 @@ from tubecert.report import gains as report_gains
 from tubecert.report.outline import widths
 from tubecert.report.page import Reason
 from tubecert.verdict import Verdict
-from tubecert.words.assumptions import assumed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,7 +88,7 @@ class Certification(Stated[Certificate]):
     @property
     def assumptions(self) -> tuple[str, ...]:
         """What the claim rests on and does not show, in words."""
-        return tuple(map(assumed, self.result.assumptions))
+        return tuple(item.told() for item in self.result.assumptions)
 
     # the gains
 

@@ -35,7 +35,6 @@ from tubecert.report.progress import timed
 from tubecert.spec import Spec, metric_file
 from tubecert.spec.metric import COORDINATES, OBJECTIVES, ROUTES
 from tubecert.verdict import Verdict
-from tubecert.words.claims import sentence
 
 if TYPE_CHECKING:
     from tubecert.pipeline.synthesised import Synthesised
@@ -303,4 +302,4 @@ def options_of(system: Spec, numbers: SynthesisNumbers) -> pipeline.Options:
 
 
 def _sentence(reason: Reason | None) -> str:
-    return "" if reason is None else sentence(reason)
+    return "" if reason is None else reason.sentence

@@ -10,6 +10,8 @@ from fractions import Fraction
 
 from tubecert.certificate.result import Result, TubeData
 from tubecert.claims import family as claims
+from tubecert.claims.advice import advice
+from tubecert.claims.conditions import SAYS, equation
 from tubecert.claims.gains import GainsSuffice
 from tubecert.digits import down, exact, short, up
 from tubecert.kinds import ALONE, DISTANCE, RATES
@@ -18,9 +20,6 @@ from tubecert.report import claimed, reach
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.page import Block, Facts, Reason
 from tubecert.verdict import Verdict
-from tubecert.words.advice import advice
-from tubecert.words.claims import message, title
-from tubecert.words.conditions import SAYS, equation
 from tubecert.words.sampled_loop import family
 
 _SPARE = {  # where the screen is full: what holds, or why it does not, and what helps, is left
@@ -51,8 +50,8 @@ def reasons(result: Result, some: Sequence[claims.Reason] | None = None) -> tupl
     return tuple(
         Reason(
             verdict=reason.verdict,
-            claim=title(reason.claim),
-            message=message(reason),
+            claim=reason.claim.title,
+            message=reason.message,
             at="" if reason.at is None else claimed.point(result, reason.at),
             relax=advice(reason.relax, result.spec.effective.uncertainty.h),
         )

@@ -41,8 +41,6 @@ from tubecert.report.page_simulation import Simulated, simulated_blocks
 from tubecert.report.page_trust import declared, proven
 from tubecert.report.shares import filled
 from tubecert.verdict import Verdict
-from tubecert.words.assumptions import assumed
-from tubecert.words.claims import sentence
 
 _ELLIPSE = (
     "The tube in each plane: the projection of the states whose Riemannian distance to the plan stays below the proven "
@@ -78,7 +76,7 @@ def page_of(certificate: Certificate, simulated: Simulated | None = None, *, all
     return Page(
         name=result.spec.effective.name,
         verdict=result.verdict,
-        summary=_numbers(result) if holds else "" if result.reason is None else sentence(result.reason),
+        summary=_numbers(result) if holds else "" if result.reason is None else result.reason.sentence,
         claim=_claim(result) if holds else "",
         meaning=_meaning(result),
         caveat=claimed.NOT_RECHECKED,
@@ -298,7 +296,7 @@ def _input_row(result: Result, own: InputData, key: str | None) -> tuple[str, ..
 def _rests_on(result: Result) -> Iterator[Block]:
     yield Items(title="Proven", items=tuple(proven(result)) or ("nothing that could be relied on",))
     yield Items(title="Declared, believed as given", items=tuple(declared(result)) or ("nothing",))
-    yield Items(title="Assumed, not proven", items=tuple(map(assumed, result.assumptions)))
+    yield Items(title="Assumed, not proven", items=tuple(item.told() for item in result.assumptions))
 
 
 def _metric(metric: MetricData, tube: TubeData | None) -> Iterator[Block]:

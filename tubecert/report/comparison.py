@@ -17,6 +17,7 @@ from pathlib import PurePath
 from typing import Final
 
 from tubecert.certificate.effective import Tree
+from tubecert.claims.conditions import SECTIONS
 from tubecert.digits import UNKNOWN, down, exact, percent, up
 from tubecert.records import exact_json
 from tubecert.report.claimed import NOT_RECHECKED, size
@@ -24,7 +25,6 @@ from tubecert.report.gains import gains_text
 from tubecert.report.page import Cell, Facts, Page, Section, Table
 from tubecert.report.quantities import AnyCertificate, AnyResult, Quantity, Value, failed, merged, quantities
 from tubecert.sampled_loop.record import Result as SampledResult
-from tubecert.words.conditions import SECTIONS
 from tubecert.words.sampled_loop import NOTHING
 
 MISSING: Final = "not there"

@@ -12,7 +12,6 @@ from tubecert.report.figures_axes import Chart, Point
 from tubecert.report.figures_scene import Plane, draw_obstacle, scene
 from tubecert.report.outline import tube_outline
 from tubecert.report.page import Figure
-from tubecert.words.claims import title as title_of
 
 
 def planes(result: Result) -> list[Plane]:
@@ -54,7 +53,7 @@ def tube_figures(result: Result) -> list[Figure]:
 def _tube(result: Result, plane: Plane) -> Figure:
     title = f"{plane.names[0]}, {plane.names[1]}"
     witnesses = [
-        (plane.of(at.x), f"{title_of(reason.claim)}: {point(result, at)}")
+        (plane.of(at.x), f"{reason.claim.title}: {point(result, at)}")
         for reason in result.reasons
         if (at := reason.at) is not None and len(at.x) > max(plane.index)
     ]

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
+from typing import Final
 
 from tubecert.certificate.result import Result
+from tubecert.claims.conditions import SECTIONS
 from tubecert.digits import exact, percent
-from tubecert.kinds.kind import Pair
+from tubecert.kinds.kind import Pair, Role
 from tubecert.verdict import Verdict
-from tubecert.words.conditions import ROLES, SECTIONS
 
 NAMES = SECTIONS
+# what a set of gains is chosen for, in the order in which they are shown
+ROLES: Final[Mapping[Role, str]] = {
+    "feedback": "feedback alone",
+    "asked": "asked for",
+    "least_bandwidth": "least omega",
+    "least_adaptation": "least Gamma",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

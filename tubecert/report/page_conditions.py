@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from math import isfinite
 
 from tubecert.certificate.result import Result
+from tubecert.claims.conditions import SAYS, SHOWN, condition_name, equation
 from tubecert.digits import UNKNOWN, down, up
 from tubecert.enclosure.constant import Constant
 from tubecert.report.gains import NAMES
 from tubecert.report.page import Block, Cell, Table, Words
-from tubecert.words.conditions import SAYS, SHOWN, condition_name, equation
 
 _MARGIN = (
     "A margin is (allowed - needed)/allowed: positive means that the condition holds. Its lower side is proven; the "

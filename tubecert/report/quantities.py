@@ -13,14 +13,15 @@ from math import isfinite
 from typing import TypeAlias
 
 from tubecert.certificate.result import Certificate, Result
+from tubecert.claims.conditions import SECTIONS, condition_name
 from tubecert.claims.family import Claim
 from tubecert.kinds.kind import Pair, SectionData
 from tubecert.kinds.table import KINDS
+from tubecert.report.gains import ROLES
 from tubecert.report.outline import widths
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sampled_loop.record import Result as SampledResult
 from tubecert.verdict import Verdict
-from tubecert.words.conditions import ROLES, SECTIONS, condition_name
 
 AnyCertificate: TypeAlias = Certificate | SampledCertificate
 AnyResult: TypeAlias = Result | SampledResult

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
+from tubecert.claims.advice import advice
 from tubecert.digits import down, end, exact, short, up
 from tubecert.expression import free_symbols, parse, symbol
 from tubecert.report.claimed import place
 from tubecert.report.page import Block, Facts, Items, Page, Section, Table, Words
-from tubecert.words.advice import advice
-from tubecert.words.claims import message, outcome
 
 if TYPE_CHECKING:
     from tubecert.certificate.metric_file import MetricFile
@@ -57,7 +56,7 @@ def page_of(data: SearchData, file: MetricFile | None, name: str, states: Sequen
     return Page(
         name=name,
         verdict=data.verdict if file is None else "metric proven",
-        summary=_numbers(file) if file is not None else message(data.reason) if data.reason else "",
+        summary=_numbers(file) if file is not None else data.reason.message if data.reason else "",
         sections=tuple(sections),
         about="synthesis",
     )
@@ -129,7 +128,7 @@ def _compared(found: Sequence[MetricRow]) -> Table:
 
 
 def _tried(attempts: Sequence[AttemptData]) -> Iterator[Block]:
-    lines = [f"rate {short(a.rate, 6)}, degree {a.degree}: {outcome(a.outcome)}" for a in attempts[-_SHOWN:]]
+    lines = [f"rate {short(a.rate, 6)}, degree {a.degree}: {a.outcome.told()}" for a in attempts[-_SHOWN:]]
     if left := len(attempts) - len(lines):
         yield Words(text=f"{left} attempts before these")
     if lines:

@@ -15,7 +15,6 @@ from tubecert.printable import printable_json
 from tubecert.records import Json, to_json
 from tubecert.report.claimed import place
 from tubecert.report.page import Facts, Page, Section
-from tubecert.words.claims import sentence
 
 if TYPE_CHECKING:
     from tubecert.pipeline.verification import Verified
@@ -30,7 +29,7 @@ def page_of(file: str, found: Verified) -> Page:
     return Page(
         name=file,
         verdict=found.verdict,
-        summary=", ".join(filter(None, known)) if reason is None else sentence(reason),
+        summary=", ".join(filter(None, known)) if reason is None else reason.sentence,
         sections=(Section(key="metric", title="Metric", blocks=(facts,)),),
         about="metric",
     )

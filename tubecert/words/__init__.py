@@ -1,11 +1,5 @@
-"""Words: claims, advice and assumptions, which are ids with parameters everywhere else, as sentences.
+"""Words: how far a command is, and what a certificate of a sampled loop says, as sentences.
 
-In: `claims`. Out: English, for reports and findings. Nothing is decided by what is written here. Trusted: no.
-
-| module | what it does |
-|---|---|
-| `claims` | what a claim is called, and why it holds or not |
-| `advice` | what would help |
-| `assumptions` | what is assumed |
-| `conditions` | what the conditions of the certificates say |
+In: steps, records. Out: English, for reports and findings. Nothing is decided by what is written here. Trusted: no.
+What a claim, an advice or an assumption says stands beside its fields, in `claims`.
 """

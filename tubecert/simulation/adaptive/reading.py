@@ -17,6 +17,7 @@ import numpy as np
 from tubecert.certificate.belonging import as_set, compared
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import InputBoundData, Result
+from tubecert.claims.advice import advice
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.rates import RateRecipe
 from tubecert.enclosure.interval import Array
@@ -28,8 +29,6 @@ from tubecert.spec import Spec, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.verdict import Verdict
-from tubecert.words.advice import advice
-from tubecert.words.claims import sentence
 
 _UNUSED: Final = ("initial_state", "obstacles", "simulation", "expect", "conditions")  # of a metric alone
 Gains = RateRecipe | DistanceRecipe
@@ -64,7 +63,7 @@ def require_tube(result: Result) -> None:
     if result.tube is not None and result.tube.rho_r is not None and result.constants:
         return
     reason = next((item for item in result.reasons if item.verdict is result.verdict), None)
-    why = "certification stopped" if reason is None else sentence(reason)
+    why = "certification stopped" if reason is None else reason.sentence
     message = f"there is no tube that a simulation could leave ({result.verdict}: {why})"
     help = advice(reason.relax if reason else ()) or "tubecert certify tells more"
     error = TubecertError([Finding(code="TC703", message=message, help=help)])

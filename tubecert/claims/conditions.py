@@ -1,25 +1,17 @@
-"""What the conditions of the certificates say, by their ids."""
+"""What the conditions of the certificates are called and say, by their ids."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
-from tubecert import kinds
-from tubecert.kinds.kind import Role
+from tubecert.letters import NAMES
 
 # what a certificate is called where its gains stand
-SECTIONS: Mapping[str, str] = {name.key: str(name) for name in kinds.NAMES}
-
-# what a set of gains is chosen for, in the order in which they are shown
-ROLES: Mapping[Role, str] = {
-    "feedback": "feedback alone",
-    "asked": "asked for",
-    "least_bandwidth": "least omega",
-    "least_adaptation": "least Gamma",
-}
+SECTIONS: Final[Mapping[str, str]] = {name.key: str(name) for name in NAMES}
 
 # a condition as it is named beside a certificate
-NAMES: Mapping[str, str] = {
+_NAMES: Final[Mapping[str, str]] = {
     "initial_distance": "dbar <= d0",
     "plan_defect": "dbar <= delta/lambda",
     "parameters": "dbar <= delta/lambda, with unknown parameters",
@@ -31,12 +23,12 @@ NAMES: Mapping[str, str] = {
 }
 
 # the quantity that the only condition of a certificate bounds
-SHOWN: Mapping[str, str] = {
+SHOWN: Final[Mapping[str, str]] = {
     "no_adaptation": "sup D(t), feedback alone",
     "distance": "sup D(t)",
 }
 
-SAYS: Mapping[str, str] = {
+SAYS: Final[Mapping[str, str]] = {
     "26a": "the initial error and the filter's share must fit into rho_r",
     "26b": "the metric's lower bound must exceed zeta_2 + zeta_3",
     "26c": "the adaptation rate must make up for the estimation error",
@@ -59,7 +51,7 @@ SAYS: Mapping[str, str] = {
 
 def condition_name(condition: str) -> str:
     """A condition as it is named beside a certificate."""
-    return NAMES.get(condition, condition)
+    return _NAMES.get(condition, condition)
 
 
 def equation(condition: str) -> str:
