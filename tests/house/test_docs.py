@@ -113,6 +113,17 @@ def test_the_readme_is_read_once():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= 1300
 
 
+def test_the_documentation_is_short():
+    """Beside the theory, its index and errata, and what docs/generate.py writes."""
+    others = {"theory", "reference"}
+    own = [
+        page for page in PAGES if page.parent.name not in others and page.stem not in {"equations", "errata"}
+    ]
+    words = {page.name: len(page.read_text(encoding="utf-8").split()) for page in own}
+    assert sum(words.values()) <= 20_000
+    assert max(words.values()) <= 1_400, words
+
+
 def test_the_glossary_has_sixty_nouns_and_each_once():
     glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     nouns = re.findall(r"^\| (?!noun)([a-z ]+) \|", glossary, re.M)
