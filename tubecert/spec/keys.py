@@ -168,8 +168,7 @@ def number(*, whole: str | None = None, side: Side = "nearest", **bounds: int) -
         value = field.number(names.values, side=side, **bounds)
         if value is None or whole is None or value.denominator == 1:
             return value if value is None or whole is None else int(value)
-        field.fail(codes.RANGE, f"{field.path} must be a whole number", whole)
-        return None
+        return field.fail(codes.RANGE, f"{field.path} must be a whole number", whole)
 
     return Kind(read, NUMBER, lambda value, _: number_text(Fraction(value)))
 
@@ -262,8 +261,7 @@ def inward(end: str = "end") -> Kind:
         if low is None or high is None or low < high:
             return None if low is None or high is None else (low, high)
         message = f"{field.path}: the lower {end} must be below the upper {'one' if end == 'limit' else end}"
-        field.fail(codes.RANGE, message, "write [lower, upper]")
-        return None
+        return field.fail(codes.RANGE, message, "write [lower, upper]")
 
     return Kind(read, PAIR, numbers_text)
 
@@ -277,8 +275,9 @@ def named(whose: Whose, kind: Kind, shown: str = "") -> Kind:
         if entries is None:
             return None
         if shown and not field.pairs():
-            field.fail(codes.RANGE, f"{field.path} is empty", f"write {{{known[0]}: {shown}}} or the like")
-            return None
+            return field.fail(
+                codes.RANGE, f"{field.path} is empty", f"write {{{known[0]}: {shown}}} or the like"
+            )
         found = tuple((name, kind.read(entries[name], names)) for name in known if name in entries)
         return None if any(value is None for _, value in found) else found
 

@@ -195,8 +195,7 @@ def _ordered(findings: list[Finding]) -> list[Finding]:
 
 def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None:
     if isinstance(root.node, Scalar) and not root.node.text:
-        root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
-        return None
+        return root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
     if is_of_another_kind(root, _OTHERS):
         return None
     alone = _asks_about_metric(root)

@@ -58,8 +58,7 @@ def read_lookup(name: str, field: Field, parameters: Mapping[str, Expression]) -
     kind = own["interpolation"].word((*_MADE, SLOPES)) if "interpolation" in own else "monotone"
     if ("file" in own) == ("points" in own):
         message = f"{field.path} needs {'either ' if 'file' in own else ''}a file or points"
-        field.fail(codes.MISSING_KEY, message, "write {file: NAME.csv}, or {points: [[x, y], [x, y]]}")
-        return None
+        return field.fail(codes.MISSING_KEY, message, "write {file: NAME.csv}, or {points: [[x, y], [x, y]]}")
     if kind is None:
         return None
     width = 3 if kind == SLOPES else 2
@@ -75,16 +74,14 @@ def _points(entry: Field, width: int, parameters: Mapping[str, Expression]) -> l
     if items is None:
         return None
     if not 2 <= len(items) <= MOST_KNOTS:
-        entry.fail(codes.TABLE, f"{entry.path} has {len(items)} points; a table has 2 to {MOST_KNOTS}")
-        return None
+        return entry.fail(codes.TABLE, f"{entry.path} has {len(items)} points; a table has 2 to {MOST_KNOTS}")
     found: list[Row] = []
     for item in items:
         row = item.numbers(width, parameters)
         if row is None:
             return None
         if found and row[0] <= found[-1][0]:
-            item.fail(codes.TABLE, f"{item.path}: {_order(str(float(row[0])))}", _SORTED)
-            return None
+            return item.fail(codes.TABLE, f"{item.path}: {_order(str(float(row[0])))}", _SORTED)
         found.append(row)
     return found
 

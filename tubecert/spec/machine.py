@@ -73,8 +73,7 @@ def _delay(field: Field, names: Names) -> Fraction | object | None:
         return field.number(names.values, least=0, side="above")
     message = f"{field.path} is {text[:40]!r}, not a time in seconds"
     help = f"write a number of seconds (half of the sample time at 500 Hz: 0.001), or `{ONE_SAMPLE}`"
-    field.fail(codes.RANGE, message, help)
-    return None
+    return field.fail(codes.RANGE, message, help)
 
 
 _LATE: Final = {"anyOf": [NUMBER, {"enum": [ONE_SAMPLE]}]}
@@ -156,8 +155,7 @@ def read_hardware(field: Field, names: Names) -> Hardware | None:
     if delay is not None and sample_time is not None and delay > MAX_LATE * sample_time:
         message = f"hardware.delay is {near(float(delay / sample_time))} samples; at most {MAX_LATE} are read"
         help = f"write a time in seconds, or `delay: {ONE_SAMPLE}`, which follows the rate (in a sweep, too)"
-        entries["delay"].fail(codes.LIMIT, message, help)
-        return None
+        return entries["delay"].fail(codes.LIMIT, message, help)
     if sample_time is None or not HARDWARE.holds(values, entries):
         return None
     return Hardware(sample_time=sample_time, **values)

@@ -147,8 +147,7 @@ def _bounds(field: Field, names: Names) -> Ends | None:
         return None
     if found["lower"] > found["upper"]:
         message = f"{field.path}: lower must not exceed upper"
-        field.fail(codes.RANGE, message, "they bound the eigenvalues of W^-1")
-        return None
+        return field.fail(codes.RANGE, message, "they bound the eigenvalues of W^-1")
     return found["lower"], found["upper"]
 
 

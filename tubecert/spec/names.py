@@ -178,11 +178,10 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
         return None
     if len(inputs) > len(states):
         field = system["inputs"]
-        field.fail(
+        return field.fail(
             codes.WRONG_SHAPE,
             f"{len(inputs)} inputs for {len(states)} states: B cannot have independent columns",
         )
-        return None
     names = Names(
         states=states,
         inputs=inputs,
@@ -204,8 +203,7 @@ def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[s
         count = len(field.node.items)
         code = codes.LIMIT if count else codes.WRONG_SHAPE
         help = "" if count or what == "state" else _NO_INPUT
-        field.fail(code, f"{field.path} has {count} entries; there must be 1 to {MAX_STATES}", help)
-        return None
+        return field.fail(code, f"{field.path} has {count} entries; there must be 1 to {MAX_STATES}", help)
     items = field.items(None, f"{what} names") if field else None
     if items is None:
         return None
@@ -213,8 +211,7 @@ def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[s
         inner = [node.text for node in items[0].node.items if isinstance(node, Scalar)]
         help = f"write [{', '.join(inner)[:60]}]: one pair of brackets is too many"
         message = f"{items[0].path} must be the name of {_with_article(what)}, not a list"
-        items[0].fail(codes.WRONG_TYPE, message, help)
-        return None
+        return items[0].fail(codes.WRONG_TYPE, message, help)
     names = [new_name(item.text(f"the name of {_with_article(what)}"), item, what, taken) for item in items]
     return tuple(name for name in names if name) if all(names) else None
 
@@ -225,8 +222,7 @@ def new_name(name: str | None, field: Field, what: str, taken: dict[str, str]) -
         return None
     problem = _problem(name, taken)
     if problem:
-        field.reader.report(codes.NAME, field.location, *problem)
-        return None
+        return field.reader.report(codes.NAME, field.location, *problem)
     taken[name] = what
     return name
 

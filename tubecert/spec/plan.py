@@ -43,8 +43,7 @@ def read_ends(field: Field, names: Names, *, point: bool = False) -> Ends | None
         return None
     if low > high:
         message = f"{field.path}: the lower end must not exceed the upper end"
-        field.fail(codes.RANGE, message, "write [lower, upper]")
-        return None
+        return field.fail(codes.RANGE, message, "write [lower, upper]")
     return low, high
 
 
@@ -80,8 +79,7 @@ def _weight(whose: keys.Whose, what: str) -> Kind:
         if symmetric and sound(weight):
             return weight
         help = "write one positive number, which stands for a multiple of the identity"
-        field.fail(codes.RANGE, f"{field.path} must be symmetric and {what}", help)
-        return None
+        return field.fail(codes.RANGE, f"{field.path} must be symmetric and {what}", help)
 
     return Kind(read, {"$ref": "#/$defs/matrix"}, keys.rows_of_numbers)
 
@@ -291,8 +289,7 @@ def read_trajectory(field: Field, names: Names, plant: Plant | None) -> Trajecto
         return None
     told = field.get("kind")
     if told is None:
-        field.fail(codes.MISSING_KEY, "trajectory lacks kind", f"add kind: {choices}")
-        return None
+        return field.fail(codes.MISSING_KEY, "trajectory lacks kind", f"add kind: {choices}")
     word = told.word(tuple(PLANS))
     kind = next((each for each in PLANS if each == word), None)
     entries = PLANS[kind].entries(field) if kind else None
@@ -320,8 +317,7 @@ def _table(entries: Mapping[str, Field], values: Mapping[str, Any], names: Names
     last, horizon = table.knots.t[-1], values.get("horizon")
     if horizon is not None and horizon > last:
         help = f"give a horizon of at most {to_text(constant(last))}, or leave it out"
-        entries["horizon"].fail(codes.RANGE, "the horizon lies beyond the plan's last time", help)
-        return None
+        return entries["horizon"].fail(codes.RANGE, "the horizon lies beyond the plan's last time", help)
     return {"table": table, "horizon": last if horizon is None else horizon}
 
 
@@ -342,8 +338,7 @@ def _trimmed(
     found = equilibrium(plant, values.get("near", middle), tuple(u or [Fraction(0)] * len(plant.inputs)))
     if found is None:
         help = "give near: [...], a point beside one, or at and input with f(at) + B(at) input = 0"
-        at.fail(codes.RANGE, "no equilibrium is found there in the safe set", help)
-        return None
+        return at.fail(codes.RANGE, "no equilibrium is found there in the safe set", help)
     return {
         key: tuple(keys.constant_term(at, own) for own in each) for key, each in zip("xu", found, strict=True)
     }

@@ -54,9 +54,10 @@ class Reader:
         self.findings: list[Finding] = []
         self.places: dict[str, Location] = {}
 
-    def report(self, code: str, location: Location, message: str, help: str = "") -> None:
-        """Adds an error."""
+    def report(self, code: str, location: Location, message: str, help: str = "") -> T | None:
+        """Adds an error; None, which is read in the place of what is wrong."""
         self.findings.append(Finding(code=code, message=message, location=location, help=help))
+        return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,9 +75,9 @@ class Field:
         width = len(self.node.text) if isinstance(self.node, Scalar) else 1
         return self._source(self.node).location(self.node.start, width)
 
-    def fail(self, code: str, message: str, help: str = "") -> None:
+    def fail(self, code: str, message: str, help: str = "") -> T | None:
         """Reports that this value will not do."""
-        self.reader.report(code, self.location, message, help)
+        return self.reader.report(code, self.location, message, help)
 
     def child(self, key: Scalar, node: Node) -> Field:
         """The value of a key."""
@@ -130,8 +131,7 @@ class Field:
     def pairs(self, purpose: str = "", shown: str = "NAME: ...") -> list[tuple[Scalar, Node]] | None:
         """The keys and values of a mapping, without keys that occur twice."""
         if not isinstance(self.node, MappingNode):
-            self._wrong_type(f"a mapping {purpose}".strip(), f"write {{{shown}}}")
-            return None
+            return self._wrong_type(f"a mapping {purpose}".strip(), f"write {{{shown}}}")
         seen: dict[str, Scalar] = {}
         for key, _ in self.node.pairs:
             if key.text == "<<" and not key.style:
@@ -150,13 +150,11 @@ class Field:
     def items(self, count: int | None = None, what: str = "entries", help: str = "") -> list[Field] | None:
         """The items of a list; another number of them than `count` is a finding."""
         if not isinstance(self.node, ListNode):
-            self._wrong_type(
+            return self._wrong_type(
                 f"a list of {what if count is None else _counted(count, what)}", help or self._listed(count)
             )
-            return None
         if count is not None and len(self.node.items) != count:
-            self._wrong_count(len(self.node.items), count, what, help)
-            return None
+            return self._wrong_count(len(self.node.items), count, what, help)
         return [self.item(i, node) for i, node in enumerate(self.node.items)]
 
     # scalars
@@ -164,8 +162,7 @@ class Field:
     def text(self, what: str = "text") -> str | None:
         """The text of a scalar."""
         if not isinstance(self.node, Scalar):
-            self._wrong_type(what)
-            return None
+            return self._wrong_type(what)
         return self.node.text
 
     def word(self, choices: Sequence[str]) -> str | None:
@@ -173,31 +170,26 @@ class Field:
         word = self.text(f"one of {', '.join(choices)}")
         if word is None or word in choices:
             return word
-        self.fail(
+        return self.fail(
             codes.RANGE, f"{self.path} is {word[:60]!r}, not one of the choices", of_word(word, choices)
         )
-        return None
 
     def number(self, parameters: Parameters, *, side: Side = "nearest", **bounds: int) -> Fraction | None:
         """A rational number, `above`, at `least` and at `most` its bounds; what contains pi is rounded to a side."""
         if not isinstance(self.node, Scalar):
-            self._wrong_type("a number", self._one_number())
-            return None
+            return self._wrong_type("a number", self._one_number())
         try:
             value = parse_number(self.node.text, parameters, side)
         except ExpressionError as error:
             error.help = elsewhere("numbers").get(self.node.text, error.help)
-            self._expression_error(error, codes.NUMBER)
-            return None
+            return self._expression_error(error, codes.NUMBER)
         if extreme := out_of_range(value):
-            self.fail(codes.LIMIT, f"{self.path} is {extreme}", MODERATE)
-            return None
+            return self.fail(codes.LIMIT, f"{self.path} is {extreme}", MODERATE)
         told = [(*_BOUNDS[name], bounds[name]) for name in _BOUNDS if name in bounds]
         if all(holds(value, bound) for _, holds, bound in told):
             return value
         needed = " and ".join(f"{sign} {bound}" for sign, _, bound in told)
-        self.fail(codes.RANGE, f"{self.path} is {self.node.text[:40]}; it must be {needed}")
-        return None
+        return self.fail(codes.RANGE, f"{self.path} is {self.node.text[:40]}; it must be {needed}")
 
     def constant(self, parameters: Parameters) -> Expression | None:
         """A number as it is, with pi if it contains that."""
@@ -206,8 +198,9 @@ class Field:
             return None
         exact = parse_constant(self.node.text, parameters)
         if longest_text(exact) > MAX_LENGTH:
-            self.fail(codes.LIMIT, f"{self.path} is too long with its parameters written out", "split it")
-            return None
+            return self.fail(
+                codes.LIMIT, f"{self.path} is too long with its parameters written out", "split it"
+            )
         return exact
 
     def numbers(self, count: int, parameters: Parameters) -> tuple[Fraction, ...] | None:
@@ -222,8 +215,9 @@ class Field:
                 return None
             return tuple(tuple(value if i == j else Fraction(0) for j in range(n)) for i in range(n))
         if self._nodes and all(isinstance(node, Scalar) for node in self._nodes):
-            self.fail(codes.WRONG_SHAPE, f"{self.path} must be a matrix, not a list", self._diagonal(n))
-            return None
+            return self.fail(
+                codes.WRONG_SHAPE, f"{self.path} must be a matrix, not a list", self._diagonal(n)
+            )
         rows = self.items(n, "rows", f"write one number, or {n} rows of {n} numbers")
         return _all([row.numbers(n, parameters) for row in rows or []], n)
 
@@ -234,17 +228,14 @@ class Field:
             help = (
                 "write a row of A x as one expression: 2*x1 - x2" if row else "put the expression in quotes"
             )
-            self._wrong_type("an expression", help)
-            return None
+            return self._wrong_type("an expression", help)
         try:
             parsed = scope.parse(self.node.text)
         except ExpressionError as error:
-            self._expression_error(error, codes.EXPRESSION)
-            return None
+            return self._expression_error(error, codes.EXPRESSION)
         for node in topological([parsed.expression, *(owed.argument for owed in parsed.obligations)]):
             if node.is_constant and (extreme := out_of_range(node.fraction)):
-                self.fail(codes.LIMIT, f"a constant of {self.path} is {extreme}", MODERATE)
-                return None
+                return self.fail(codes.LIMIT, f"a constant of {self.path} is {extreme}", MODERATE)
         return Term(
             expression=parsed.expression,
             obligations=parsed.obligations,
@@ -256,13 +247,11 @@ class Field:
     def terms(self, count: int, scope: Scope, what: str = "expressions") -> tuple[Term, ...] | None:
         """A list of expressions; the ones that are there are read even if their number is wrong."""
         if not isinstance(self.node, ListNode):
-            self._wrong_type(f"a list of {what}", self._listed(count))
-            return None
+            return self._wrong_type(f"a list of {what}", self._listed(count))
         nodes = self.node.items[: 2 * count + 8]
         found = [self.item(i, node).term(scope) for i, node in enumerate(nodes)]
         if len(self.node.items) != count:
-            self._wrong_count(len(self.node.items), count, what)
-            return None
+            return self._wrong_count(len(self.node.items), count, what)
         return _all(found, count)
 
     def term_matrix(self, rows: int, columns: int, scope: Scope) -> TermMatrix | None:
@@ -270,8 +259,7 @@ class Field:
         row = f"[{', '.join(['...'] * columns)}]"
         shape = f"[{', '.join([row] * rows)}]" if rows * columns <= 9 else f"{rows} rows of {columns}"
         if isinstance(self.node, ListNode) and all(isinstance(node, Scalar) for node in self.node.items):
-            self.fail(codes.WRONG_SHAPE, f"{self.path} must be a list of rows", f"write {shape}")
-            return None
+            return self.fail(codes.WRONG_SHAPE, f"{self.path} must be a list of rows", f"write {shape}")
         help = f"write {shape}"
         if rows != columns == len(self._nodes):
             help += "; these rows may be its columns"
@@ -286,10 +274,10 @@ class Field:
 
     # findings
 
-    def _expression_error(self, error: ExpressionError, ordinary: str) -> None:
+    def _expression_error(self, error: ExpressionError, ordinary: str) -> T | None:
         special = _CODE_OF_KIND[error.kind]
         code = ordinary if special == codes.EXPRESSION else special
-        self.reader.report(code, self.inside(error.offset, error.width), error.message, error.help)
+        return self.reader.report(code, self.inside(error.offset, error.width), error.message, error.help)
 
     def _at(self, code: str, key: Scalar, message: str, help: str = "") -> None:
         self.reader.report(code, self._source(key).location(key.start, len(key.text)), message, help)
@@ -335,7 +323,7 @@ class Field:
         rows = [", ".join(text[:20] if i == j else "0" for j in range(n)) for i, text in enumerate(texts)]
         return f"with these numbers on its diagonal it is [{', '.join(f'[{row}]' for row in rows)}]"
 
-    def _wrong_count(self, found: int, wanted: int, what: str, help: str = "") -> None:
+    def _wrong_count(self, found: int, wanted: int, what: str, help: str = "") -> T | None:
         texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
         if any(";" in text for text in texts):
             help = "entries are separated by commas: [..., ...]"
@@ -344,7 +332,9 @@ class Field:
         if found == 1 and wanted > 1 and isinstance(self._nodes[0], ListNode) and "rows" not in what:
             help = help or "one pair of brackets is too many"
         entries = "1 entry" if found == 1 else f"{found} entries"
-        self.fail(codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {_counted(wanted, what)}", help)
+        return self.fail(
+            codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {_counted(wanted, what)}", help
+        )
 
     @property
     def _nodes(self) -> tuple[Node, ...]:
@@ -366,9 +356,9 @@ class Field:
         self._at(codes.UNKNOWN_KEY, key, message, advice)
         return meant
 
-    def _wrong_type(self, wanted: str, help: str = "") -> None:
+    def _wrong_type(self, wanted: str, help: str = "") -> T | None:
         if isinstance(self.node, BrokenNode):
-            return  # has been reported
+            return None  # has been reported
         found = "a list" if isinstance(self.node, ListNode) else "a mapping"
         if isinstance(self.node, Scalar):
             found = f"the text {self.node.text[:40]!r}" if self.node.text else "nothing"
@@ -376,7 +366,7 @@ class Field:
                 found = f"the number {self.node.text[:40]}"
         instead = of_value(self.path, self.node.text if isinstance(self.node, Scalar) else "")
         name = self.path or self.reader.document
-        self.fail(codes.WRONG_TYPE, f"{name} must be {wanted}, not {found}", instead or help)
+        return self.fail(codes.WRONG_TYPE, f"{name} must be {wanted}, not {found}", instead or help)
 
 
 def root_field(reader: Reader, node: Node | None) -> Field:

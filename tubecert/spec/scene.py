@@ -39,8 +39,7 @@ def _read_plane(field: Field, names: Names) -> tuple[str, str] | None:
     if len(chosen) != 2 or chosen[0] is None or chosen[1] is None:
         return None
     if chosen[0] == chosen[1]:
-        items[1].fail(codes.RANGE, f"{chosen[1]} occurs twice", help)
-        return None
+        return items[1].fail(codes.RANGE, f"{chosen[1]} occurs twice", help)
     return chosen[0], chosen[1]
 
 
@@ -51,8 +50,9 @@ def _polygon(field: Field, names: Names) -> Matrix | None:
         return None
     items = field.items(None, "corners") or []
     if not 3 <= len(items) <= MAX_VERTICES:
-        field.fail(codes.WRONG_SHAPE, f"{field.path} has {len(items)} corners; it needs 3 to {MAX_VERTICES}")
-        return None
+        return field.fail(
+            codes.WRONG_SHAPE, f"{field.path} has {len(items)} corners; it needs 3 to {MAX_VERTICES}"
+        )
     corners = [item.numbers(2, names.values) for item in items]
     found = tuple(corner for corner in corners if corner is not None)
     if len(found) < len(items):
@@ -60,8 +60,7 @@ def _polygon(field: Field, names: Names) -> Matrix | None:
     for i, j in _crossings(found):
         message = f"{field.path}: the edges from corners {i + 1} and {j + 1} touch or cross"
         help = "list the corners once, in the order in which one meets them going round"
-        items[j].fail(codes.RANGE, message, help)
-        return None
+        return items[j].fail(codes.RANGE, message, help)
     return found
 
 
@@ -156,8 +155,7 @@ def read_obstacles(field: Field, names: Names) -> tuple[Obstacle, ...] | None:
     if items is None:
         return None
     if len(items) > MAX_OBSTACLES:
-        field.fail(codes.LIMIT, f"there are {len(items)} obstacles; at most {MAX_OBSTACLES} are read")
-        return None
+        return field.fail(codes.LIMIT, f"there are {len(items)} obstacles; at most {MAX_OBSTACLES} are read")
     found = [_obstacle(item, names) for item in items]
     sound = tuple(own for own in found if own)
     return sound if len(sound) == len(found) else None
@@ -171,8 +169,7 @@ def _obstacle(field: Field, names: Names) -> Obstacle | None:
     if ("polygon" in entries) == ("disc" in entries):
         message = "an obstacle is either a polygon or a disc"
         help = "write polygon: [[...], ...], or disc: {center: [...], radius: r}"
-        field.fail(codes.MISSING_KEY, message, help)
-        return None
+        return field.fail(codes.MISSING_KEY, message, help)
     decides = YES.read(entries["decide"], names) is not False if "decide" in entries else True
     if "polygon" in entries:
         corners = _polygon(entries["polygon"], names)
@@ -187,8 +184,9 @@ def _plane(field: Field | None, owner: Field, names: Names) -> tuple[str, str] |
         return _read_plane(field, names)
     if len(names.states) == 2:
         return names.states[0], names.states[1]
-    owner.fail(codes.MISSING_KEY, "the obstacle lacks states", f"add states: [{', '.join(names.states[:2])}]")
-    return None
+    return owner.fail(
+        codes.MISSING_KEY, "the obstacle lacks states", f"add states: [{', '.join(names.states[:2])}]"
+    )
 
 
 def obstacles_data(obstacles: Iterable[Obstacle], spec: Any) -> list[dict[str, Any]]:
@@ -245,8 +243,7 @@ def read_simulation(field: Field | None, plan: Trajectory | None, names: Names) 
     values = SIMULATION.values(entries, names)
     duration, horizon = values.get("duration"), plan and plan.horizon
     if duration is not None and horizon is not None and duration > horizon:
-        entries["duration"].fail(
+        return entries["duration"].fail(
             codes.RANGE, "the duration exceeds trajectory.horizon", "the plan ends there"
         )
-        return None
     return Simulation(**values) if SIMULATION.holds(values, entries) else None

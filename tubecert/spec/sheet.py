@@ -19,7 +19,7 @@ from tubecert.expression.scan import MAX_NUMBER_EXPONENT, MAX_NUMBER_LENGTH
 from tubecert.files import read
 from tubecert.findings import Finding, Location
 from tubecert.spec import codes
-from tubecert.spec.reader import Field
+from tubecert.spec.reader import Field, T
 from tubecert.spec.scope import MODERATE, out_of_range
 from tubecert.spec.source import PLAN, Mark, Source, decoded
 
@@ -50,12 +50,13 @@ class Sheet:
     findings: list[Finding] = field(default_factory=list)
     lines: list[Location] = field(default_factory=list)
 
-    def fail(self, cell: Cell, code: str, message: str, help: str = "") -> None:
-        """Adds a finding at a cell."""
+    def fail(self, cell: Cell, code: str, message: str, help: str = "") -> T | None:
+        """Adds a finding at a cell; None, which is read in its place."""
         mark = Mark(line=cell.line, column=cell.column)
         location = self.source.location(mark, len(cell.text))
         location = location if self.shown else replace(location, source="")
         self.findings.append(Finding(code=code, message=message, location=location, help=help))
+        return None
 
     def note(self, cells: list[Cell]) -> None:
         """Keeps where a line stands; its text is not kept."""
@@ -77,10 +78,9 @@ def opened(entry: Field) -> Opened | None:
     if name is None:
         return None
     if not name.isprintable():
-        entry.fail(
+        return entry.fail(
             codes.NAME, "the name of the file holds a character that does not print", "rename the file"
         )
-        return None
     path = Path(entry.reader.source.file).parent / name
     try:
         data = read(str(path), PLAN)
@@ -132,14 +132,12 @@ def is_decimal(cell: Cell) -> bool:
 def number(sheet: Sheet, cell: Cell, help: str = "") -> Fraction | None:
     """The number that a cell is; what is none is a finding, with `help` and no text if the sheet may be anything."""
     if not sheet.shown and not is_decimal(cell):
-        sheet.fail(cell, codes.NUMBER, "this cell is not a decimal number", help)
-        return None
+        return sheet.fail(cell, codes.NUMBER, "this cell is not a decimal number", help)
     match = _DECIMAL.fullmatch(cell.text)
     if match and len(cell.text) <= MAX_NUMBER_LENGTH and abs(int(match[1] or 0)) <= MAX_NUMBER_EXPONENT:
         value = Fraction(cell.text)
         if extreme := out_of_range(value):
-            sheet.fail(cell, codes.LIMIT, f"{cell.text[:40]} is {extreme}", MODERATE)
-            return None
+            return sheet.fail(cell, codes.LIMIT, f"{cell.text[:40]} is {extreme}", MODERATE)
         return value
     code, message = codes.NUMBER, f"{cell.text[:40]!r} is not a decimal number"
     try:
@@ -149,5 +147,4 @@ def number(sheet: Sheet, cell: Cell, help: str = "") -> Fraction | None:
         message, help = error.message, error.help
         if cell.text.lower() == "nan":
             help = "give the value, or leave the row out"
-    sheet.fail(cell, code, message, help)
-    return None
+    return sheet.fail(cell, code, message, help)

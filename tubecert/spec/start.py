@@ -125,15 +125,13 @@ def _start(field: Field, plan: Trajectory) -> Vector | None:
             value = substitute([term.expression], {TIME: ZERO})[0]
         except ZeroDivisionError:
             message = "the plan is not defined at t = 0"
-            field.reader.report(codes.RANGE, term.location, message, "the horizon begins at t = 0")
-            return None
+            return field.reader.report(codes.RANGE, term.location, message, "the horizon begins at t = 0")
         if not value.is_constant:
-            field.reader.report(
+            return field.reader.report(
                 codes.MISSING_KEY,
                 term.location,
                 f"the plan starts at {to_text(value)[:60]}, which is not rational; initial_state is needed",
                 "add initial_state: {at: [...]}",
             )
-            return None
         start.append(value.fraction)
     return tuple(start)

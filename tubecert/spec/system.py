@@ -153,8 +153,7 @@ def known_of(field: Field, terms: tuple[Term, ...], names: Names) -> tuple[Term,
         which = field.path.rpartition(".")[2]
         message = f"{which} is undefined where every parameter is in the middle of its range"
         help = "a divisor vanishes there; give ranges that keep away from it"
-        field.fail(codes.EXPRESSION, message, help)
-        return None
+        return field.fail(codes.EXPRESSION, message, help)
 
 
 def _put(term: Term, values: Mapping[str, Expression]) -> Term:
@@ -250,13 +249,11 @@ def read_uncertainty(field: Field | None, machine: Field | None, names: Names) -
     if not entries:
         message = "uncertainty needs h, bounds, or both"
         help = 'write h: ["0"] if there is no uncertainty, or bounds: {h: ..., h_x: ..., h_t: ...}'
-        field.fail(codes.MISSING_KEY, message, help)
-        return None
+        return field.fail(codes.MISSING_KEY, message, help)
     if machine and len(entries) > 1:
         message = "uncertainty has h and bounds beside hardware"
         help = "give one of the two: what h is, or what is known of it"
-        field.fail(codes.RANGE, message, help)
-        return None
+        return field.fail(codes.RANGE, message, help)
     values = UNCERTAINTY.sound(entries, names)
     bounds = None
     if "bounds" in entries:
@@ -299,8 +296,7 @@ def _combined(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | N
         known = [value for part in parts for value in [getattr(part, name)] if value is not None]
         if known and len(known) < len(parts):
             message = f"{field.path} bounds {name} of some inputs only"
-            field.fail(codes.MISSING_KEY, message, f"bound {name} of every input, or of none")
-            return None
+            return field.fail(codes.MISSING_KEY, message, f"bound {name} of every input, or of none")
         total[name] = root_above(sum((q * q for q in known), start=Fraction(0))) if known else None
     return Bounds(**total)
 
@@ -322,8 +318,7 @@ def _shape(field: Field, names: Names) -> TermMatrix | None:
     if not rows or not width:
         return None
     if width > MAX_COLUMNS:
-        field.fail(codes.LIMIT, f"{field.path} has {width} columns; at most {MAX_COLUMNS} are read")
-        return None
+        return field.fail(codes.LIMIT, f"{field.path} has {width} columns; at most {MAX_COLUMNS} are read")
     return field.term_matrix(len(names.states), width, names.of_state())
 
 

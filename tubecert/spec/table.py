@@ -60,10 +60,9 @@ def _read_column(name: str, field: Field | None, names: Names) -> Column | None:
         return Column(name=field.node.text)
     found: Column | None = Column() if field is None else _COLUMN.read(field, names)
     if field is not None and found is not None and (not found.scale or (name == "t" and found.scale < 0)):
-        field.fail(
+        return field.fail(
             codes.RANGE, f"{field.path}.scale is {found.scale}", "write 1/1000 for ms, 1 deg for degrees"
         )
-        return None
     return found and replace(found, name=found.name or name)
 
 
@@ -112,8 +111,7 @@ def _rows(
         return None
     if header is None:
         message = "the plan file is empty"
-        sheet.fail(Cell(text="", line=0, column=0), codes.PLAN_COLUMNS, message, _wanted(wanted))
-        return None
+        return sheet.fail(Cell(text="", line=0, column=0), codes.PLAN_COLUMNS, message, _wanted(wanted))
     places = _columns(sheet, header, wanted, others=columns is not None)
     if places is None:
         return None
@@ -123,8 +121,9 @@ def _rows(
     values: list[list[Fraction]] = []
     for row in lines:
         if len(values) == MAX_ROWS:
-            sheet.fail(row[0], codes.LIMIT, f"a plan has at most {MAX_ROWS:,} rows", "give every second knot")
-            return None
+            return sheet.fail(
+                row[0], codes.LIMIT, f"a plan has at most {MAX_ROWS:,} rows", "give every second knot"
+            )
         numbers = reader.numbers(row, values[-1] if values else None)
         if numbers is not None:
             sheet.shown = True
@@ -153,13 +152,12 @@ def _columns(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, other
         cells = "has 1 cell, which is" if len(header) == 1 else f"has {len(header)} cells, none of which is"
         message = f"the first line {cells} t, a state or an input"
         commas = len(header) == 1 and re.search(r"[;\t ]", header[0].text)
-        sheet.fail(
+        return sheet.fail(
             Cell(text="", line=header[0].line, column=0),
             codes.PLAN_COLUMNS,
             message,
             f"separate columns by commas; {_wanted(wanted)}" if commas else _wanted(wanted),
         )
-        return None
     # of columns with names that a stranger chose nothing is shown before a row of numbers
     sheet.shown = not others and all(_NAME.fullmatch(cell.text) for cell in header)
     place = _placed(sheet, header, wanted, others=others)
@@ -215,8 +213,7 @@ class _Rows:
             count = "1 cell" if len(row) == 1 else f"{len(row)} cells"
             where = row[-1] if len(row) < self.width else row[self.width]
             message = f"the row has {count}; the header names {self.width} columns"
-            self.sheet.fail(where, codes.PLAN_COLUMNS, message)
-            return None
+            return self.sheet.fail(where, codes.PLAN_COLUMNS, message)
         found: list[Fraction | None] = []
         for k, (place, scale) in enumerate(self.columns):
             absent = ends and k >= kept and row[place].text.lower() in _ABSENT
@@ -236,8 +233,7 @@ class _Rows:
         if is_input and cell.text.lower() in _ABSENT:
             message = "an input is missing in this row; the last row alone may lack inputs"
             help = "give the value (if it is held, that before it), or leave the row out"
-            self.sheet.fail(cell, codes.NUMBER, message, help)
-            return None
+            return self.sheet.fail(cell, codes.NUMBER, message, help)
         value = number(self.sheet, cell)
         if value is None or scale == 1:
             return value

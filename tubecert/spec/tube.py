@@ -35,8 +35,7 @@ def read_name(field: Field) -> str | None:
     slug = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:64]
     message = f"{name[:60]!r} cannot be a name"
     help = "use ASCII letters, digits, _ and -, at most 64" + (f": {slug}" if slug else "")
-    field.fail(codes.NAME, message, help)
-    return None
+    return field.fail(codes.NAME, message, help)
 
 
 def _gap(field: Field, _: Names) -> str | None:
@@ -44,8 +43,7 @@ def _gap(field: Field, _: Names) -> str | None:
     if re.fullmatch(r"[0-9./eE%+-]+", text) is None:
         return field.word((AUTO,))
     help = f"write auto here; a number is an option: --gap {text[:20]}"
-    field.fail(codes.RANGE, f"{field.path} is {text[:20]}", help)
-    return None
+    return field.fail(codes.RANGE, f"{field.path} is {text[:20]}", help)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,12 +92,10 @@ def read_tube(field: Field, names: Names) -> Tube | None:
     tube = Tube(**values)
     if tube.half_widths and (radius := entries.get("epsilon")):
         help = "they fix the whole tube: give one of the two"
-        radius.fail(codes.RANGE, f"{radius.path} beside half_widths", help)
-        return None
+        return radius.fail(codes.RANGE, f"{radius.path} beside half_widths", help)
     if tube.half_widths and tube.coordinates == "identity":
         message, help = "half_widths with coordinates: identity", "write coordinates: auto, or leave it out"
-        entries["coordinates"].fail(codes.RANGE, message, help)
-        return None
+        return entries["coordinates"].fail(codes.RANGE, message, help)
     return tube
 
 
@@ -125,15 +121,13 @@ def _predictor(field: Field, names: Names) -> Fraction | object | None:
     if not isinstance(field.node, Scalar):
         message = f"{field.path} is a matrix; the predictor is a multiple of the identity"
         help = "write auto, or a negative number: -10 stands for -10 I; no matrix serves better than auto"
-        field.fail(codes.STABILITY, message, help)
-        return None
+        return field.fail(codes.STABILITY, message, help)
     value = field.number(names.values)
     if value is not None and value >= 0:
         message = (
             f"{field.path} is {number_text(value)}, and a predictor that is stable needs a negative number"
         )
-        field.fail(codes.STABILITY, message, "write auto, or -10, which stands for -10 I")
-        return None
+        return field.fail(codes.STABILITY, message, "write auto, or -10, which stands for -10 I")
     return None if value is None else -value
 
 
@@ -209,8 +203,7 @@ def _range(field: Field, names: Names) -> Ends | None:
     least, most = field.numbers(2, names.values) or (None, None)
     if least is None or most is None or least <= most:
         return None if least is None or most is None else (least, most)
-    field.fail(codes.RANGE, f"{field.path}: the range is empty", "write [least, most]")
-    return None
+    return field.fail(codes.RANGE, f"{field.path}: the range is empty", "write [least, most]")
 
 
 _RANGE: Final = Kind(_range, keys.PAIR, keys.numbers_text)
