@@ -8,8 +8,6 @@ an explicit stack, so that depth is checked before it can hurt.
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -22,10 +20,10 @@ from tubecert.spec.source import MAX_NESTING, Mark, Source
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placed:
-    """Where a node stands; `source` is the text that `start` is a place of, where that is not the file's."""
+    """Where a node stands: `start` in the text `source`."""
 
     start: Mark
-    source: Source | None = field(default=None, repr=False)
+    source: Source = field(repr=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,22 +75,19 @@ def compose(source: Source, language: str = "YAML") -> tuple[Node | None, list[F
     `language` is what findings call it (JSON is YAML).
     """
     composer = _Composer(source)
+    # The C parser is the same grammar, faster; where PyYAML was built without it the other one serves.
+    loader: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
-        for event in _events(source.text):
-            composer.take(event)
-            if composer.depth > MAX_NESTING:
-                composer.report(codes.LIMIT, event, f"the text is nested more than {MAX_NESTING} deep")
+        for event in yaml.parse(source.text, Loader=loader):
+            composer.take(event, _mark(event.start_mark))
+            if len(composer.stack) > MAX_NESTING:
+                message = f"the text is nested more than {MAX_NESTING} deep"
+                composer.report(codes.LIMIT, _mark(event.start_mark), message)
                 return None, composer.findings
     except yaml.YAMLError as error:
         composer.findings.append(_syntax(source, error, language))
         return None, composer.findings
     return composer.root, composer.findings
-
-
-def _events(text: str) -> Iterator[yaml.Event]:
-    # The C parser is the same grammar, faster; where PyYAML was built without it the other one serves.
-    loader: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    yield from yaml.parse(text, Loader=loader)
 
 
 class _Composer:
@@ -104,51 +99,46 @@ class _Composer:
         self.root: Node | None = None
         self.documents = 0
         self.stack: list[_Open] = []
-        self.extras: Counter[str] = Counter()
+        self.refused: set[str] = set()
 
-    @property
-    def depth(self) -> int:
-        return len(self.stack)
-
-    def report(self, code: str, event: yaml.Event, message: str, help: str = "") -> None:
-        """Adds a finding at the event."""
-        location = self.source.location(_mark(event.start_mark))
+    def report(self, code: str, mark: Mark, message: str, help: str = "") -> None:
+        """Adds a finding."""
+        location = self.source.location(mark)
         self.findings.append(Finding(code=code, message=message, location=location, help=help))
 
-    def take(self, event: yaml.Event) -> None:
+    def take(self, event: yaml.Event, start: Mark) -> None:
         """Takes one event."""
         if isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
             if self.documents == 2:
-                self.report(codes.YAML_FEATURE, event, "a file holds one document", "remove what follows ---")
+                self.report(codes.YAML_FEATURE, start, "a file holds one document", "remove what follows ---")
         elif isinstance(event, yaml.AliasEvent):
-            self._refuse("aliases", event, "quote text that begins with *, or repeat what it stands for")
-            self._place(BrokenNode(start=_mark(event.start_mark)))
+            self._refuse("aliases", start, "quote text that begins with *, or repeat what it stands for")
+            self._place(BrokenNode(start=start, source=self.source))
+        elif isinstance(event, yaml.ScalarEvent):
+            broken, style, end = self._is_refused(event, start), event.style or "", _mark(event.end_mark)
+            scalar = Scalar(start=start, source=self.source, end=end, text=event.value, style=style)
+            self._place(BrokenNode(start=start, source=self.source) if broken else scalar)
         elif isinstance(event, yaml.NodeEvent):
-            broken = self._refuse_extras(event)
-            if isinstance(event, yaml.ScalarEvent):
-                self._place(BrokenNode(start=_mark(event.start_mark)) if broken else _scalar(event))
-            else:
-                mapping = isinstance(event, yaml.MappingStartEvent)
-                self.stack.append(_Open(start=_mark(event.start_mark), mapping=mapping, broken=broken))
+            mapping = isinstance(event, yaml.MappingStartEvent)
+            self.stack.append(_Open(start=start, mapping=mapping, broken=self._is_refused(event, start)))
         elif isinstance(event, yaml.CollectionEndEvent):
             self._place(self._close(self.stack.pop()))
 
-    def _refuse_extras(self, event: yaml.NodeEvent) -> bool:
+    def _is_refused(self, event: yaml.NodeEvent, start: Mark) -> bool:
         """Reports anchors and tags; returns whether a tag changes what the node means."""
         if event.anchor is not None:
-            self._refuse("anchors", event, "remove it, or quote text that begins with &")
+            self._refuse("anchors", start, "remove it, or quote text that begins with &")
         tag: str | None = getattr(event, "tag", None)
-        if tag is None:
-            return False
-        self._refuse("tags", event, "remove it, or quote text that begins with !")
-        return tag not in _PLAIN_TAGS
+        if tag is not None:
+            self._refuse("tags", start, "remove it, or quote text that begins with !")
+        return tag is not None and tag not in _PLAIN_TAGS
 
-    def _refuse(self, what: str, event: yaml.Event, help: str) -> None:
+    def _refuse(self, what: str, start: Mark, help: str) -> None:
         """One finding for each kind of thing, at its first occurrence: a bomb holds thousands."""
-        self.extras[what] += 1
-        if self.extras[what] == 1:
-            self.report(codes.YAML_FEATURE, event, f"{what} are not allowed", help)
+        if what not in self.refused:
+            self.report(codes.YAML_FEATURE, start, f"{what} are not allowed", help)
+        self.refused.add(what)
 
     def _place(self, node: Node) -> None:
         if self.stack:
@@ -158,24 +148,16 @@ class _Composer:
 
     def _close(self, open_: _Open) -> Node:
         if open_.broken:
-            return BrokenNode(start=open_.start)
+            return BrokenNode(start=open_.start, source=self.source)
         if not open_.mapping:
-            return ListNode(start=open_.start, items=tuple(open_.children))
+            return ListNode(start=open_.start, source=self.source, items=tuple(open_.children))
         pairs: list[tuple[Scalar, Node]] = []
         for key, value in zip(open_.children[::2], open_.children[1::2], strict=True):
             if isinstance(key, Scalar):
                 pairs.append((key, value))
             elif not isinstance(key, BrokenNode):
-                location = self.source.location(key.start)
-                self.findings.append(
-                    Finding(code=codes.WRONG_TYPE, message="a key must be a plain word", location=location)
-                )
-        return MappingNode(start=open_.start, pairs=tuple(pairs))
-
-
-def _scalar(event: yaml.ScalarEvent) -> Scalar:
-    start, end = _mark(event.start_mark), _mark(event.end_mark)
-    return Scalar(start=start, end=end, text=event.value, style=event.style or "")
+                self.report(codes.WRONG_TYPE, key.start, "a key must be a plain word")
+        return MappingNode(start=open_.start, source=self.source, pairs=tuple(pairs))
 
 
 def _mark(mark: Any) -> Mark:  # the two parsers have marks of different types
@@ -234,14 +216,15 @@ def _remedy(problem: str, line: str) -> str:
     return "check indentation, brackets and quotes near this place"
 
 
-def place_in(source: Source, scalar: Scalar, offset: int) -> Mark:
+def place_in(scalar: Scalar, offset: int) -> Mark:
     """Where the character at `offset` of the scalar's text stands in the file.
 
     Folding and `''` are followed by matching characters; a text with backslash escapes is located at its
     start.
     """
-    raw_start, raw_end = source.index(scalar.start), source.index(scalar.end)
-    raw = source.text[raw_start:raw_end]
+    source = scalar.source
+    raw_start = source.index(scalar.start)
+    raw = source.text[raw_start : source.index(scalar.end)]
     if scalar.style == '"' and "\\" in raw:
         return scalar.start
     position = raw.find("\n") + 1 if scalar.style in ("|", ">") else 1 if scalar.style else 0

@@ -24,14 +24,8 @@ _NAME = r"[A-Za-z_]\w*"
 _INDEX = r"(?:0|[1-9]\d{0,5})"
 _PATH = re.compile(rf"{_NAME}(?:\.{_NAME}|\[{_INDEX}\])*", re.ASCII)
 _PART = re.compile(rf"({_NAME})|\[({_INDEX})\]", re.ASCII)
-_OWN_NAMES: Final = (
-    "system.parameters",
-    "system.definitions",
-    "system.tables",
-    "system.units",
-    "system.outputs",
-)  # their keys are the user's words
-_MEANT: Final = _OWN_NAMES[:2]
+_MEANT: Final = ("system.parameters", "system.definitions")
+_OWN_NAMES: Final = (*_MEANT, "system.tables", "system.units", "system.outputs")  # keys are the user's words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,107 +72,86 @@ class _OptionText(Source):
     def location(self, mark: Mark, width: int = 1) -> Location:
         """The place as a finding names it."""
         found = Source.location(self, mark, width)
-        return NamedPlace(file=self.file, line=1, column=found.column, source=self.text, width=max(1, width))
+        return NamedPlace(
+            file=self.file, line=1, column=found.column, source=found.source, width=max(1, width)
+        )
 
 
-@dataclass(slots=True)
 class _Put:
-    """One setting on its way into the tree."""
+    """One setting on its way into the tree: `parts` are the keys and numbers of its path."""
 
-    setting: Setting
-    findings: list[Finding]
-    source: Source = field(init=False)
-    _elsewhere: Mapping[str, str] = field(init=False, default_factory=dict)
+    def __init__(self, setting: Setting, findings: list[Finding]) -> None:
+        self.setting, self.findings = setting, findings
+        self.source = _OptionText.of(setting.place, str(setting))
+        self.parts = list(_PART.finditer(setting.path))
 
-    def __post_init__(self) -> None:
-        self.source = _OptionText.of(self.setting.place, str(self.setting))
-
-    def within(self, node: Node) -> Node:
+    def within(self, root: Node, k: int = 0, names: Mapping[str, str] | None = None) -> Node:
         """The tree with the value in its place; as it was, with a finding, where there is no such place."""
-        self._elsewhere = _named(node)
-        return self._put(node, 0)
-
-    def _put(self, node: Node, start: int) -> Node:
-        match = _PART.match(self.setting.path, start + self.setting.path.startswith(".", start))
-        if match is None:
+        names = _named(root) if names is None else names
+        if k == len(self.parts):
             return self._value()
-        if match[1] is None:
-            return self._put_item(node, match)
-        if isinstance(node, MappingNode) or (isinstance(node, Scalar) and not node.text and not node.style):
-            return self._put_key(node, match)
-        found = "a list" if isinstance(node, ListNode) else "a value"
-        help = "number the entries of a list from 0: [0]" if isinstance(node, ListNode) else ""
-        self._fail(match, f"{self._before(match)} is {found}: it has no keys", help)
-        return node
-
-    def _put_key(self, node: Node, match: re.Match[str]) -> Node:
-        key, pairs = match[1], node.pairs if isinstance(node, MappingNode) else ()
-        if any(own.text == key for own, _ in pairs):
-            changed = [
-                (own, self._put(value, match.end()) if own.text == key else value) for own, value in pairs
-            ]
-            return MappingNode(start=node.start, source=node.source, pairs=tuple(changed))
-        if self._before(match) in _OWN_NAMES:
-            names = [own.text for own, _ in pairs]
-            help = suggestion(key, names, what="names in the file") if names else "the file has none there"
-            self._fail(match, f"unknown name {key} in {self._before(match)}", help)
-            return node
-        whole = not match.start() and match.end() == len(self.setting.path)
-        plain = self.setting.text[0] not in "[{"  # a section is no number
-        if whole and plain and key in self._elsewhere:
-            help = f"write --set {self._elsewhere[key]}.{key}=..."
-            self._fail(match, f"{key} is no key of a specification", help)
-            return node
-        rest = _PART.match(self.setting.path, match.end())
-        if rest is not None and rest[2] is not None:
-            self._fail(match, f"{self.setting.path[: match.end()]} is not in the file: it has no entries")
-            return node
-        mark = Mark(line=0, column=match.start())
-        own = Scalar(start=mark, end=Mark(line=0, column=match.end()), text=key, source=self.source)
-        below = self._put(MappingNode(start=mark, pairs=(), source=self.source), match.end())
-        return MappingNode(start=node.start, source=node.source, pairs=(*pairs, (own, below)))
-
-    def _put_item(self, node: Node, match: re.Match[str]) -> Node:
-        items = node.items if isinstance(node, ListNode) else ()
-        index = int(match[2])
-        if index >= len(items):
-            have = f"has {len(items)} entries" if isinstance(node, ListNode) else "is no list"
+        part, before = self.parts[k], self.setting.path[: self.parts[k].start()].rstrip(".")
+        before = before or "the specification"
+        if part[1] is None:
+            items = root.items if isinstance(root, ListNode) else ()
+            index = int(part[2])
+            if isinstance(root, ListNode) and index < len(items):
+                changed = [
+                    self.within(own, k + 1, names) if i == index else own for i, own in enumerate(items)
+                ]
+                return replace(root, items=tuple(changed))
+            have = f"has {len(items)} entries" if isinstance(root, ListNode) else "is no list"
             help = f"they are numbered from [0] to [{len(items) - 1}]" if items else ""
-            self._fail(match, f"{self._before(match)} {have}: there is no [{index}]", help)
-            return node
-        changed = [self._put(item, match.end()) if i == index else item for i, item in enumerate(items)]
-        return ListNode(start=node.start, source=node.source, items=tuple(changed))
+            return self._unchanged(root, part, f"{before} {have}: there is no [{index}]", help)
+        if isinstance(root, Scalar) and not root.text and not root.style:
+            root = MappingNode(start=root.start, source=root.source, pairs=())
+        if isinstance(root, MappingNode):
+            return self._within(root, k, before, names)
+        found = "a list" if isinstance(root, ListNode) else "a value"
+        help = "number the entries of a list from 0: [0]" if isinstance(root, ListNode) else ""
+        return self._unchanged(root, part, f"{before} is {found}: it has no keys", help)
+
+    def _within(self, node: MappingNode, k: int, before: str, names: Mapping[str, str]) -> Node:
+        """The same of a mapping: a key that is not there yet is added, but no name of the user's."""
+        part, known = self.parts[k], [own.text for own, _ in node.pairs]
+        key = part[1]
+        if key in known:
+            pairs = [
+                (own, self.within(value, k + 1, names) if own.text == key else value)
+                for own, value in node.pairs
+            ]
+            return replace(node, pairs=tuple(pairs))
+        if before in _OWN_NAMES:
+            help = suggestion(key, known, what="names in the file") if known else "the file has none there"
+            return self._unchanged(node, part, f"unknown name {key} in {before}", help)
+        if (
+            len(self.parts) == 1 and key in names and self.setting.text[0] not in "[{"
+        ):  # a section is no number
+            help = f"write --set {names[key]}.{key}=..."
+            return self._unchanged(node, part, f"{key} is no key of a specification", help)
+        if k + 1 < len(self.parts) and self.parts[k + 1][1] is None:
+            message = f"{self.setting.path[: part.end()]} is not in the file: it has no entries"
+            return self._unchanged(node, part, message)
+        start, end = Mark(line=0, column=part.start()), Mark(line=0, column=part.end())
+        own = Scalar(start=start, end=end, text=key, source=self.source)
+        below = self.within(MappingNode(start=start, pairs=(), source=self.source), k + 1, names)
+        return replace(node, pairs=(*node.pairs, (own, below)))
 
     def _value(self) -> Node:
         """The value: a scalar as it is written, or a list or mapping in brackets."""
-        text, start = self.setting.text, len(self.setting.path) + 1
+        text, column = self.setting.text, len(self.setting.path) + 1
+        start, end = Mark(line=0, column=column), Mark(line=0, column=column + len(text))
+        plain = Scalar(start=start, end=end, text=text, source=self.source)
         if text[0] not in "[{":
-            end = Mark(line=0, column=start + len(text))
-            return Scalar(start=Mark(line=0, column=start), end=end, text=text, source=self.source)
-        node, findings = compose(_OptionText.of(self.source.file, " " * start + text))
+            return plain
+        node, findings = compose(replace(self.source, text=" " * column + text))
         self.findings += findings
-        mark = Mark(line=0, column=start)
-        return Scalar(start=mark, end=mark, text="", source=self.source) if node is None else self._ours(node)
+        return node or replace(plain, text="", end=start)
 
-    def _ours(self, node: Node) -> Node:
-        """A node with this option as its place."""
-        match node:
-            case ListNode():
-                return replace(node, source=self.source, items=tuple(map(self._ours, node.items)))
-            case MappingNode():
-                pairs = tuple(
-                    (replace(key, source=self.source), self._ours(value)) for key, value in node.pairs
-                )
-                return replace(node, source=self.source, pairs=pairs)
-            case _:
-                return replace(node, source=self.source)
-
-    def _before(self, match: re.Match[str]) -> str:
-        return self.setting.path[: match.start()].rstrip(".") or "the specification"
-
-    def _fail(self, match: re.Match[str], message: str, help: str = "") -> None:
-        place = self.source.location(Mark(line=0, column=match.start()), match.end() - match.start())
+    def _unchanged(self, node: Node, part: re.Match[str], message: str, help: str = "") -> Node:
+        place = self.source.location(Mark(line=0, column=part.start()), part.end() - part.start())
         self.findings.append(Finding(code=codes.UNKNOWN_KEY, message=message, location=place, help=help))
+        return node
 
 
 def _named(root: Node) -> dict[str, str]:
@@ -200,10 +173,9 @@ def put(node: Node | None, settings: Sequence[Setting]) -> tuple[Node | None, li
     for index, setting in enumerate(settings):
         other = next((each for each in settings[:index] if setting.meets(each.path)), None)
         if other is not None:
+            twice = f"{setting.path} is set twice"
+            message = twice if other.path == setting.path else f"{other.path} is set, too"
             source = _OptionText.of(setting.place, str(setting))
-            message = (
-                f"{setting.path} is set twice" if other.path == setting.path else f"{other.path} is set, too"
-            )
             place = source.location(Mark(line=0, column=0), len(setting.path))
             findings.append(
                 Finding(code=codes.DUPLICATE_KEY, message=message, location=place, help="keep one")

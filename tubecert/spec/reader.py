@@ -73,7 +73,7 @@ class Field:
     def location(self) -> Location:
         """Where the value begins."""
         width = len(self.node.text) if isinstance(self.node, Scalar) else 1
-        return self._source(self.node).location(self.node.start, width)
+        return self.node.source.location(self.node.start, width)
 
     def fail(self, code: str, message: str, help: str = "") -> T | None:
         """Reports that this value will not do."""
@@ -269,8 +269,7 @@ class Field:
     def inside(self, offset: int, width: int) -> Location:
         """The place of a part of a scalar's text."""
         assert isinstance(self.node, Scalar)
-        source = self._source(self.node)
-        return source.location(place_in(source, self.node, offset), width)
+        return self.node.source.location(place_in(self.node, offset), width)
 
     # findings
 
@@ -280,10 +279,7 @@ class Field:
         return self.reader.report(code, self.inside(error.offset, error.width), error.message, error.help)
 
     def _at(self, code: str, key: Scalar, message: str, help: str = "") -> None:
-        self.reader.report(code, self._source(key).location(key.start, len(key.text)), message, help)
-
-    def _source(self, node: Node) -> Source:
-        return node.source or self.reader.source
+        self.reader.report(code, key.source.location(key.start, len(key.text)), message, help)
 
     def _name(self, key: str) -> str:
         return f"{self.path}.{key}" if self.path else key
@@ -372,7 +368,9 @@ class Field:
 def root_field(reader: Reader, node: Node | None) -> Field:
     """The whole document; an empty file is an empty text."""
     start = Mark(line=0, column=0)
-    return Field(reader=reader, path="", node=node or Scalar(start=start, end=start, text=""))
+    return Field(
+        reader=reader, path="", node=node or Scalar(start=start, source=reader.source, end=start, text="")
+    )
 
 
 def is_of_another_kind(root: Field, kinds: Mapping[str, tuple[str, str]]) -> bool:
