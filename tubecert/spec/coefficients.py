@@ -15,11 +15,10 @@ import csv
 import io
 import json
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final, NoReturn, TypeAlias
 
 from tubecert.errors import SpecError
 from tubecert.expression import ExpressionError, constant, number_text, parse, symbol
@@ -38,26 +37,28 @@ _CLOSE: Final = Fraction(1, 10**9)  # of the largest entry: what rounding may ma
 _MOST: Final = 10_000  # numbers in a file
 _KEYS: Final = ("coefficients", "monomials", "powers", "rate")
 _COLUMNS: Final = ["monomial", "row", "column", "value"]
+_HELP: Final = (
+    "it holds `coefficients`: W itself where that is constant, else K symmetric matrices with `monomials` or "
+    "`powers`; `rate` beside them; docs/synthesis.md has examples"
+)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Coefficients:
-    """W_k (K, n, n) as texts of numbers, the g_k as texts, and the rate if the file has one."""
-
-    matrices: tuple[tuple[tuple[str, ...], ...], ...]
-    monomials: tuple[str, ...]
-    rate: str | None
+Content: TypeAlias = Mapping[str, Any]
+Block: TypeAlias = Sequence[Sequence[str]]
 
 
 def metric_text(path: str, spec: Spec, rate: Fraction | None) -> str:
     """The text of a metric file for the specification's states; raises `SpecError` for what is no such file."""
-    found = _READERS[Path(path).suffix.lower()](path, spec)
-    if rate is None and found.rate is None:
-        _refuse(path, codes.MISSING_KEY, "the file has no rate", "add `rate`, in 1/s, or give --rate")
-    _check_monomials(path, spec, found.monomials)
-    n = len(spec.states)
-    rows = [[" + ".join(_terms(found, min(i, j), max(i, j))) or "0" for j in range(n)] for i in range(n)]
-    text = found.rate if rate is None else number_text(rate)
+    file = _File(path, spec)
+    content = _READERS[Path(path).suffix.lower()](file)
+    blocks, own_rate = file.numbers(content)
+    monomials = file.monomials(content, len(blocks))
+    file.check_symmetry(blocks)
+    if rate is None and own_rate is None:
+        file.refuse(codes.MISSING_KEY, "the file has no rate", "add `rate`, in 1/s, or give --rate")
+    file.check_monomials(monomials)
+    each, n = list(zip(blocks, monomials, strict=True)), range(file.n)
+    rows = [[_sum((block[min(i, j)][max(i, j)], own) for block, own in each) for j in n] for i in n]
+    text = own_rate if rate is None else number_text(rate)
     return json.dumps({"format": "tubecert-metric/1", "rate": text, "dual_metric": rows})
 
 
@@ -73,165 +74,83 @@ def is_of_coefficients(path: str, data: bytes | None = None) -> bool:
     return isinstance(content, dict) and "coefficients" in content
 
 
-def _terms(found: Coefficients, i: int, j: int) -> list[str]:
-    parts = []
-    for matrix, monomial in zip(found.matrices, found.monomials, strict=True):
-        value = matrix[i][j]
-        if Fraction(value):
-            parts.append(f"({value})" if monomial == "1" else f"({value})*({monomial})")
-    return parts
+def _sum(parts: Iterable[tuple[str, str]]) -> str:
+    """The sum of numbers times monomials."""
+    terms = [f"({q})" if own == "1" else f"({q})*({own})" for q, own in parts if Fraction(q)]
+    return " + ".join(terms) or "0"
 
 
-def _check_monomials(path: str, spec: Spec, monomials: Sequence[str]) -> None:
-    """Each of them is an expression by itself: put together they could read as something else."""
-    known = {name: symbol(name) for name in spec.states}
-    known |= {name: constant(value) for name, value in spec.parameters}
-    for text in monomials:
+class _File:
+    """A file of coefficients for the `n` states of a specification; what is wrong with it raises `SpecError`."""
+
+    def __init__(self, path: str, spec: Spec) -> None:
+        self.path, self.spec, self.n = path, spec, len(spec.states)
+
+    @property
+    def data(self) -> bytes:
+        """Its bytes."""
+        return read(self.path, _KIND)
+
+    def refuse(self, code: str, message: str, help: str = _HELP, line: int = 1) -> NoReturn:
+        """Raises."""
+        place = Location(file=self.path, line=line, column=1)
+        raise SpecError([Finding(code=code, message=message, location=place, help=help)])
+
+    def numbers(self, content: Content) -> tuple[list[Block], str | None]:
+        """The W_k, (K, n, n), and the rate if there is one, as texts of numbers."""
+        if "coefficients" not in content:
+            self.refuse(codes.MISSING_KEY, "there are no `coefficients`")
+        found, rate = content["coefficients"], content.get("rate")
         try:
-            parse(text, symbols=known)
-        except ExpressionError as error:
-            message = f"the monomial {text[:60]!r}: {error.message}"
-            _refuse(path, codes.EXPRESSION, message, error.help)
+            blocks = list(found) if isinstance(found[0][0], list) else [found]  # one may stand alone
+            if sum(len(row) for block in blocks for row in block) > _MOST:
+                self.refuse(codes.LIMIT, f"there are more than {_MOST:,} coefficients", "")
+            exact: list[Block] = [[[_number(own) for own in row] for row in block] for block in blocks]
+            while isinstance(rate, list) and len(rate) == 1:
+                rate = rate[0]
+            rate = None if rate is None else _number(rate)
+        except (ValueError, TypeError, ZeroDivisionError):
+            self.refuse(codes.NUMBER, "a coefficient, or the rate, is no finite number")
+        if any(len(block) != self.n or any(len(row) != self.n for row in block) for block in exact):
+            self.refuse(codes.WRONG_SHAPE, f"the coefficients are not K matrices of {self.n} x {self.n}")
+        return exact, rate
 
+    def monomials(self, content: Content, count: int) -> list[str]:
+        """The g_k as texts, given or by their powers."""
+        given, powers = content.get("monomials"), content.get("powers")
+        if given is not None and powers is not None:
+            self.refuse(codes.DUPLICATE_KEY, "there are `monomials` and `powers`", "one of them is enough")
+        if given is None and powers is None and count == 1:
+            return ["1"]
+        found = given
+        if not isinstance(given, list) and isinstance(powers, list):
+            found = [_product(row, self.spec.states) for row in powers]
+        texts: list[Any] = found if isinstance(found, list) else []
+        if len(texts) != count or not all(isinstance(own, str) and own for own in texts):
+            what = f"{count} coefficient matrices need as many `monomials`, or rows of `powers`"
+            self.refuse(codes.WRONG_SHAPE, what)
+        return texts
 
-# -- formats
+    def check_monomials(self, monomials: Sequence[str]) -> None:
+        """Each of them is an expression by itself: put together they could read as something else."""
+        known = {name: symbol(name) for name in self.spec.states}
+        known |= {name: constant(value) for name, value in self.spec.parameters}
+        for text in monomials:
+            try:
+                parse(text, symbols=known)
+            except ExpressionError as error:
+                self.refuse(codes.EXPRESSION, f"the monomial {text[:60]!r}: {error.message}", error.help)
 
-
-def _json(path: str, spec: Spec) -> Coefficients:
-    try:
-        content = json.loads(read(path, _KIND), parse_float=_Written, parse_int=_Written)
-    except (ValueError, RecursionError) as error:
-        _refuse(path, codes.WRONG_TYPE, f"this is no JSON: {error}", "")
-    if not isinstance(content, dict):
-        _refuse(path, codes.WRONG_TYPE, "this is no object with coefficients", _help())
-    for key in content:
-        if key not in _KEYS:
-            _refuse(path, codes.UNKNOWN_KEY, f"{key[:40]!r} is not known", _help())
-    return _assembled(path, spec, content)
-
-
-class _Written(str):
-    """A number as it is written."""
-
-
-def _csv(path: str, spec: Spec) -> Coefficients:
-    try:
-        rows = [row for row in csv.reader(io.StringIO(read(path, _KIND).decode("utf-8-sig"))) if row]
-    except (UnicodeDecodeError, csv.Error) as error:
-        _refuse(path, codes.WRONG_TYPE, f"this is no CSV: {error}", "")
-    n = len(spec.states)
-    if len(rows) == n and all(len(row) == n for row in rows) and rows[0][0].strip() != _COLUMNS[0]:
-        return _assembled(path, spec, {"coefficients": [[cell.strip() for cell in row] for row in rows]})
-    if not rows or [cell.strip() for cell in rows[0]] != _COLUMNS:
-        message = f"neither {n} rows of {n} numbers, nor a first line monomial,row,column,value"
-        _refuse(path, codes.WRONG_SHAPE, message, _help())
-    entries: dict[str, dict[tuple[int, int], str]] = {}
-    for number, row in enumerate(rows[1:], start=2):
-        cells = [cell.strip() for cell in row]
-        try:
-            monomial, i, j = cells[0], int(cells[1]) - 1, int(cells[2]) - 1
-            value = _number(cells[3])
-        except (ValueError, IndexError):
-            _refuse(
-                path, codes.WRONG_SHAPE, f"line {number} is not monomial,row,column,value", _help(), number
-            )
-        if not (0 <= i < n and 0 <= j < n):
-            _refuse(path, codes.WRONG_SHAPE, f"line {number}: W is {n} x {n}, counted from 1", "", number)
-        own = entries.setdefault(monomial, {})
-        if (i, j) in own:
-            _refuse(path, codes.DUPLICATE_KEY, f"line {number}: the entry occurs twice", "", number)
-        own[i, j] = value
-    return _assembled(
-        path,
-        spec,
-        {
-            "monomials": list(entries),
-            "coefficients": [
-                [[own.get((i, j), own.get((j, i), "0")) for j in range(n)] for i in range(n)]
-                for own in entries.values()
-            ],
-        },
-    )
-
-
-def _npz(path: str, spec: Spec) -> Coefficients:
-    import numpy as np
-
-    data = read(path, _KIND)
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            if sum(item.file_size for item in archive.infolist()) > _KIND.most:
-                _refuse(path, codes.LIMIT, f"the arrays are larger than {_KIND.most:,} bytes", "")
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            content = {key: arrays[key].tolist() for key in arrays.files if key in _KEYS}
-    except (ValueError, OSError, zipfile.BadZipFile, KeyError, EOFError) as error:
-        _refuse(path, codes.WRONG_TYPE, f"this is no .npz of plain arrays: {error}", _help())
-    return _assembled(path, spec, content)
-
-
-def _mat(path: str, spec: Spec) -> Coefficients:
-    import numpy as np
-    from scipy.io import loadmat
-
-    data = read(path, _KIND)
-    try:
-        found = loadmat(io.BytesIO(data), variable_names=_KEYS)  # type: ignore[arg-type]
-    except NotImplementedError:
-        _refuse(path, codes.WRONG_TYPE, "this is a .mat file of version 7.3", "save it with -v7")
-    except Exception as error:  # its reader raises whatever it meets in a broken file
-        _refuse(path, codes.WRONG_TYPE, f"this is no .mat file: {error}", _help())
-    content: dict[str, Any] = {}
-    for key in (key for key in _KEYS if key in found):
-        array = np.asarray(found[key])
-        if key == "coefficients" and array.ndim == 3:
-            array = np.moveaxis(array, -1, 0)
-        if key == "monomials":
-            content[key] = [str(np.asarray(cell).ravel()[0]).strip() for cell in array.ravel()]
-        else:
-            content[key] = array.ravel()[0].item() if key == "rate" else array.tolist()
-    return _assembled(path, spec, content)
-
-
-_READERS: Final[Mapping[str, Callable[[str, Spec], Coefficients]]] = {
-    ".json": _json,
-    ".csv": _csv,
-    ".npz": _npz,
-    ".mat": _mat,
-}
-
-
-# -- what they have in common
-
-
-def _assembled(path: str, spec: Spec, content: Mapping[str, Any]) -> Coefficients:
-    """The coefficients in a mapping of plain lists; every shape is checked."""
-    if "coefficients" not in content:
-        _refuse(path, codes.MISSING_KEY, "there are no `coefficients`", _help())
-    n = len(spec.states)
-    try:
-        blocks = _blocks(content["coefficients"])
-        if sum(len(row) for block in blocks for row in block) > _MOST:
-            _refuse(path, codes.LIMIT, f"there are more than {_MOST:,} coefficients", "")
-        matrices = tuple(tuple(tuple(map(_number, row)) for row in block) for block in blocks)
-        rate = None if content.get("rate") is None else _number(_single(content["rate"]))
-    except (ValueError, TypeError, ZeroDivisionError):
-        _refuse(path, codes.NUMBER, "a coefficient, or the rate, is no finite number", _help())
-    if any(len(block) != n or any(len(row) != n for row in block) for block in matrices):
-        _refuse(path, codes.WRONG_SHAPE, f"the coefficients are not K matrices of {n} x {n}", _help())
-    monomials = _monomials(path, spec, content, len(matrices))
-    _check_symmetry(path, matrices)
-    return Coefficients(matrices=matrices, monomials=monomials, rate=rate)
-
-
-def _blocks(value: Any) -> list[Any]:
-    """K matrices; one may stand alone."""
-    return list(value) if isinstance(value[0][0], list) else [value]
-
-
-def _single(value: Any) -> Any:
-    while isinstance(value, list) and len(value) == 1:
-        value = value[0]
-    return value
+    def check_symmetry(self, blocks: Sequence[Block]) -> None:
+        """Entries across the diagonal are equal, up to rounding."""
+        for k, block in enumerate(blocks):
+            exact = [[Fraction(e) for e in row] for row in block]
+            most = max(abs(e) for row in exact for e in row)
+            for i, row in enumerate(exact):
+                for j in range(i):
+                    if abs(row[j] - exact[j][i]) > _CLOSE * most:
+                        what = f"coefficient matrix {k + 1} is not symmetric in entry ({i + 1}, {j + 1})"
+                        self.refuse(codes.SYMMETRY, what, "")
 
 
 def _number(value: Any) -> str:
@@ -242,23 +161,6 @@ def _number(value: Any) -> str:
     if len(text) > 60 or abs(int(text.lower().partition("e")[2] or 0)) > 400:
         raise ValueError("no number of moderate size")
     return number_text(Fraction(text))
-
-
-def _monomials(path: str, spec: Spec, content: Mapping[str, Any], count: int) -> tuple[str, ...]:
-    given, powers = content.get("monomials"), content.get("powers")
-    if given is not None and powers is not None:
-        _refuse(path, codes.DUPLICATE_KEY, "there are `monomials` and `powers`", "one of them is enough")
-    if given is None and powers is None and count == 1:
-        return ("1",)
-    texts: list[Any] | None = None
-    if isinstance(given, list):
-        texts = given
-    elif isinstance(powers, list):
-        texts = [_product(row, spec.states) for row in powers]
-    if texts is None or len(texts) != count or not all(isinstance(text, str) and text for text in texts):
-        what = f"{count} coefficient matrices need as many `monomials`, or rows of `powers`"
-        _refuse(path, codes.WRONG_SHAPE, what, _help())
-    return tuple(texts)
 
 
 def _product(row: Any, states: Sequence[str]) -> str:
@@ -277,24 +179,92 @@ def _product(row: Any, states: Sequence[str]) -> str:
     return "*".join(parts) or "1"
 
 
-def _check_symmetry(path: str, matrices: Sequence[Sequence[Sequence[str]]]) -> None:
-    for k, block in enumerate(matrices):
-        exact = [[Fraction(e) for e in row] for row in block]
-        most = max(abs(e) for row in exact for e in row)
-        for i, row in enumerate(exact):
-            for j in range(i):
-                if abs(row[j] - exact[j][i]) > _CLOSE * most:
-                    what = f"coefficient matrix {k + 1} is not symmetric in entry ({i + 1}, {j + 1})"
-                    _refuse(path, codes.SYMMETRY, what, "")
+class _Written(str):
+    """A number as it is written."""
 
 
-def _help() -> str:
-    return (
-        "it holds `coefficients`: W itself where that is constant, else K symmetric matrices with `monomials` or "
-        "`powers`; `rate` beside them; docs/verify.md has examples"
-    )
+def _json(file: _File) -> Content:
+    try:
+        content = json.loads(file.data, parse_float=_Written, parse_int=_Written)
+    except (ValueError, RecursionError) as error:
+        file.refuse(codes.WRONG_TYPE, f"this is no JSON: {error}", "")
+    if not isinstance(content, dict):
+        file.refuse(codes.WRONG_TYPE, "this is no object with coefficients")
+    if unknown := next((key for key in content if key not in _KEYS), None):
+        file.refuse(codes.UNKNOWN_KEY, f"{unknown[:40]!r} is not known")
+    return content
 
 
-def _refuse(path: str, code: str, message: str, help: str, line: int = 1) -> NoReturn:
-    place = Location(file=path, line=line, column=1)
-    raise SpecError([Finding(code=code, message=message, location=place, help=help)])
+def _csv(file: _File) -> Content:
+    try:
+        rows = [row for row in csv.reader(io.StringIO(file.data.decode("utf-8-sig"))) if row]
+    except (UnicodeDecodeError, csv.Error) as error:
+        file.refuse(codes.WRONG_TYPE, f"this is no CSV: {error}", "")
+    rows, n = [[cell.strip() for cell in row] for row in rows], file.n
+    if len(rows) == n and all(len(row) == n for row in rows) and rows[0][0] != _COLUMNS[0]:
+        return {"coefficients": rows}
+    if not rows or rows[0] != _COLUMNS:
+        message = f"neither {n} rows of {n} numbers, nor a first line monomial,row,column,value"
+        file.refuse(codes.WRONG_SHAPE, message)
+    entries: dict[str, dict[tuple[int, int], str]] = {}
+    for line, cells in enumerate(rows[1:], start=2):
+        try:
+            i, j, value = int(cells[1]) - 1, int(cells[2]) - 1, _number(cells[3])
+        except (ValueError, IndexError):
+            file.refuse(codes.WRONG_SHAPE, f"line {line} is not monomial,row,column,value", line=line)
+        if not (0 <= i < n and 0 <= j < n):
+            file.refuse(codes.WRONG_SHAPE, f"line {line}: W is {n} x {n}, counted from 1", "", line)
+        own = entries.setdefault(cells[0], {})
+        if (i, j) in own:
+            file.refuse(codes.DUPLICATE_KEY, f"line {line}: the entry occurs twice", "", line)
+        own[i, j] = value
+    blocks = [
+        [[own.get((i, j), own.get((j, i), "0")) for j in range(n)] for i in range(n)]
+        for own in entries.values()
+    ]
+    return {"monomials": list(entries), "coefficients": blocks}
+
+
+def _npz(file: _File) -> Content:
+    import numpy as np
+
+    data = file.data
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if sum(item.file_size for item in archive.infolist()) > _KIND.most:
+                file.refuse(codes.LIMIT, f"the arrays are larger than {_KIND.most:,} bytes", "")
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            return {key: arrays[key].tolist() for key in arrays.files if key in _KEYS}
+    except (ValueError, OSError, zipfile.BadZipFile, KeyError, EOFError) as error:
+        file.refuse(codes.WRONG_TYPE, f"this is no .npz of plain arrays: {error}")
+
+
+def _mat(file: _File) -> Content:
+    import numpy as np
+    from scipy.io import loadmat
+
+    data = file.data
+    try:
+        found = loadmat(io.BytesIO(data), variable_names=_KEYS)  # type: ignore[arg-type]
+    except NotImplementedError:
+        file.refuse(codes.WRONG_TYPE, "this is a .mat file of version 7.3", "save it with -v7")
+    except Exception as error:  # its reader raises whatever it meets in a broken file
+        file.refuse(codes.WRONG_TYPE, f"this is no .mat file: {error}")
+    content: dict[str, Any] = {}
+    for key in (key for key in _KEYS if key in found):
+        array = np.asarray(found[key])
+        if key == "coefficients" and array.ndim == 3:
+            array = np.moveaxis(array, -1, 0)
+        if key == "monomials":
+            content[key] = [str(np.asarray(cell).ravel()[0]).strip() for cell in array.ravel()]
+        else:
+            content[key] = array.ravel()[0].item() if key == "rate" else array.tolist()
+    return content
+
+
+_READERS: Final[Mapping[str, Callable[[_File], Content]]] = {
+    ".json": _json,
+    ".csv": _csv,
+    ".npz": _npz,
+    ".mat": _mat,
+}
