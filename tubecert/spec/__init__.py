@@ -9,7 +9,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `reader` | a cursor that answers with values or findings |
 | `keys` | the vocabulary of the table of keys: kinds, keys, sections |
 | `system`, `plan`, `start`, `metric`, `tube`, `machine`, `scene` | the table: sections of the file by chapters |
-| `names` | the names that expressions may use |
+| `names` | the names that expressions may use, and outputs |
 | `table` | a plan file (CSV): text -> exact knots |
 | `algebra` | exact checks: definiteness, symmetry, rank |
 | `trim` | the equilibrium near a point |

@@ -16,15 +16,8 @@ _LARGEST_SYMBOLIC = 4  # columns up to which det(B^T B) is expanded
 
 
 def is_positive_definite(matrix: Matrix) -> bool:
-    """Whether a symmetric matrix is positive definite: every pivot of the elimination is positive."""
-    rows = [list(row) for row in matrix]
-    for k, row in enumerate(rows):
-        if row[k] <= 0:
-            return False
-        for below in rows[k + 1 :]:
-            ratio = below[k] / row[k]
-            below[k:] = [b - ratio * r for b, r in zip(below[k:], row[k:], strict=True)]
-    return True
+    """Whether a symmetric matrix is positive definite."""
+    return is_positive_semidefinite(matrix) and rank(matrix) == len(matrix)
 
 
 def is_positive_semidefinite(matrix: Matrix) -> bool:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 from tubecert.expression import Side, constant, full_text, number_text, to_text
 from tubecert.spec import codes
 from tubecert.spec.document import Scalar
-from tubecert.spec.reader import Field
+from tubecert.spec.reader import Field, whole
 from tubecert.spec.values import Ends, Matrix, Term, TermMatrix, Vector
 
 if TYPE_CHECKING:
@@ -232,10 +232,9 @@ def constants(whose: Whose) -> Kind:
     """The same, as expressions."""
 
     def read(field: Field, names: Names) -> tuple[Term, ...] | None:
-        items = field.items(len(getattr(names, whose)), "numbers") or []
-        found = [(item, item.number(names.values)) for item in items]
-        terms = tuple(constant_term(item, value) for item, value in found if value is not None)
-        return terms if terms and len(terms) == len(found) else None
+        values = field.numbers(len(getattr(names, whose)), names.values)
+        items = zip(field.items() or (), values, strict=True) if values else ()
+        return tuple(constant_term(*each) for each in items) or None
 
     return Kind(read, LIST, texts)
 
@@ -278,8 +277,9 @@ def named(whose: Whose, kind: Kind, shown: str = "") -> Kind:
             return field.fail(
                 codes.RANGE, f"{field.path} is empty", f"write {{{known[0]}: {shown}}} or the like"
             )
-        found = tuple((name, kind.read(entries[name], names)) for name in known if name in entries)
-        return None if any(value is None for _, value in found) else found
+        there = [name for name in known if name in entries]
+        found = whole(kind.read(entries[name], names) for name in there)
+        return None if found is None else tuple(zip(there, found, strict=True))
 
     form = _by_name(kind) | ({"minProperties": 1} if shown else {})
     return Kind(read, form, lambda values, spec: {name: kind.write(value, spec) for name, value in values})
@@ -291,8 +291,7 @@ def each(whose: Whose, kind: Kind) -> Kind:
     def read(field: Field, names: Names) -> tuple[Any, ...] | None:
         known = getattr(names, whose)
         entries = field.mapping(required=known) or {}
-        found = [kind.read(entries[name], names) for name in known if name in entries]
-        return tuple(found) if len(found) == len(known) and None not in found else None
+        return whole((kind.read(entries[name], names) for name in known if name in entries), len(known))
 
     def write(values: Iterable[Any], spec: Any) -> dict[str, Any]:
         return {name: kind.write(own, spec) for name, own in zip(getattr(spec, whose), values, strict=True)}

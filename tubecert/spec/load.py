@@ -23,8 +23,7 @@ from tubecert.spec.machine import (
     read_hardware,
 )
 from tubecert.spec.metric import METRIC, WANTED, Metric, Synthesis, read_metric
-from tubecert.spec.names import TIME, Names, read_names
-from tubecert.spec.outputs import with_outputs
+from tubecert.spec.names import TIME, Names, read_names, with_outputs
 from tubecert.spec.override import Setting, put
 from tubecert.spec.plan import PLANS, at_rest, completed, read_trajectory, trajectory_data
 from tubecert.spec.reader import Field, Reader, is_of_another_kind, root_field

@@ -1,9 +1,9 @@
-"""The names of a specification, and what each kind of expression may use of them."""
+"""The names of a specification, outputs among them, and what each kind of expression may use of them."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
@@ -13,26 +13,30 @@ from tubecert.expression import (
     ONE,
     RESERVED,
     UNKNOWN,
+    ZERO,
     Expression,
     Lookup,
     Obligation,
     Parsed,
     constant,
+    derivatives,
     free_symbols,
     is_name,
+    rates_of,
+    substitute,
     symbol,
     topological,
 )
 from tubecert.spec import codes
 from tubecert.spec.document import ListNode, Scalar
 from tubecert.spec.lookup import read_lookup
-from tubecert.spec.rates import rates_of_states
 from tubecert.spec.reader import Field
 from tubecert.spec.scope import Scope
-from tubecert.spec.values import Output
+from tubecert.spec.values import Output, Term
 
 TIME: Final = "t"
 MAX_STATES: Final = 32
+_SHOWN: Final = 40  # characters of an expression
 _NO_INPUT: Final = (
     "what is proven is how near a controller keeps to a plan: name what it could move, with its column of B; of a "
     "plant that is stable by itself it need not move anything: hardware: {rate: 500} and controller: none"
@@ -368,3 +372,71 @@ def new_names(
 def key_field(field: Field, key: Scalar) -> Field:
     """A key, to report about it."""
     return Field(reader=field.reader, path=f"{field.path}.{key.text[:60]}", node=key)
+
+
+def with_outputs(names: Names, field: Field | None) -> Names:
+    """The names with those of the outputs; one that cannot be read stands for the first state."""
+    found: list[Output] = []
+    example = f"{names.states[-1]} - 0.5*{names.states[0]}"
+    purpose = "of names to linear combinations of states"
+    for name, entry, written in new_names(field, purpose, "output", _taken(names), "tip: x + 0.5*y"):
+        term = entry.term(names.of_state())
+        output = None if term is None else _linear(written, term, names)
+        if term is not None and output is None:
+            message = f"{entry.path} is not a sum of states times rational numbers"
+            help = f"an output is linear: write e.g. {example}, without a constant"
+            entry.fail(codes.RANGE, message, help)
+        if name is not None:
+            first = tuple(Fraction(state == names.states[0]) for state in names.states)
+            found.append(output or Output(name=name, row=first))
+    return replace(names, outputs=tuple(found))
+
+
+def _linear(name: str, term: Term, names: Names) -> Output | None:
+    """The coefficients, where the term is a sum of states times rational numbers."""
+    e = term.expression
+    slopes = [derivatives([e], state)[0] for state in names.states]
+    if term.obligations or not all(slope.is_constant for slope in slopes):
+        return None
+    if all(slope is ZERO for slope in slopes) or substitute([e], dict.fromkeys(names.states, ZERO)) != [ZERO]:
+        return None
+    return Output(name=name, row=tuple(slope.fraction for slope in slopes))
+
+
+def _taken(names: Names) -> dict[str, str]:
+    """What the names of a system stand for."""
+    groups = {
+        "state": names.states,
+        "input": names.inputs,
+        "parameter": (*names.values, *dict(names.ranges)),
+        "table": dict(names.tables),
+        "definition": dict(names.definitions),
+    }
+    return {name: what for what, group in groups.items() for name in group}
+
+
+def rates_of_states(f: Field | None, states: Sequence[str]) -> dict[str, str]:
+    """What to say of each name that reads as the derivative of a state (dz, zdot), which is what f says, and not z.
+
+    f is taken as it is written, read or not.
+    """
+    nodes = f.node.items if f is not None and isinstance(f.node, ListNode) else ()
+    texts = [node.text.strip() if isinstance(node, Scalar) else "" for node in nodes]
+    texts = texts if len(texts) == len(states) else [""] * len(states)
+    names = {rate for state in states for rate in rates_of(state)} - set(states)
+    told: dict[str, str] = {}
+    for number, (state, text) in enumerate(zip(states, texts, strict=True), start=1):
+        usable = 0 < len(text) <= _SHOWN and not names & set(re.findall(r"[A-Za-z]\w*", text))
+        instead = text if text.isidentifier() else f"({text})"
+        write = f"by f that is {text}: write {instead}" if usable else _unknown(number, state)
+        told |= {
+            rate: f"{rate} reads as the derivative of {state}, and is no name here; {write}"
+            for rate in rates_of(state)
+            if rate in names
+        }
+    return told
+
+
+def _unknown(number: int, state: str) -> str:
+    entry = f"its entry {number} is that of {state}"
+    return f"the derivatives are what f gives: {entry}, a state (its velocity) or an expression of states"

@@ -7,7 +7,7 @@ problem.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from operator import ge, gt, le
@@ -205,7 +205,7 @@ class Field:
 
     def numbers(self, count: int, parameters: Parameters) -> tuple[Fraction, ...] | None:
         """A list of numbers."""
-        return _all([item.number(parameters) for item in self.items(count, "numbers") or []], count)
+        return whole([item.number(parameters) for item in self.items(count, "numbers") or []], count)
 
     def matrix(self, n: int, parameters: Parameters) -> Matrix | None:
         """A square matrix of numbers, or a number that stands for a multiple of the identity."""
@@ -219,7 +219,7 @@ class Field:
                 codes.WRONG_SHAPE, f"{self.path} must be a matrix, not a list", self._diagonal(n)
             )
         rows = self.items(n, "rows", f"write one number, or {n} rows of {n} numbers")
-        return _all([row.numbers(n, parameters) for row in rows or []], n)
+        return whole([row.numbers(n, parameters) for row in rows or []], n)
 
     def term(self, scope: Scope) -> Term | None:
         """An expression."""
@@ -252,7 +252,7 @@ class Field:
         found = [self.item(i, node).term(scope) for i, node in enumerate(nodes)]
         if len(self.node.items) != count:
             return self._wrong_count(len(self.node.items), count, what)
-        return _all(found, count)
+        return whole(found, count)
 
     def term_matrix(self, rows: int, columns: int, scope: Scope) -> TermMatrix | None:
         """A matrix of expressions, row by row."""
@@ -264,7 +264,7 @@ class Field:
         if rows != columns == len(self._nodes):
             help += "; these rows may be its columns"
         found = self.items(rows, "rows", help)
-        return _all([row.terms(columns, scope) for row in found or []], rows)
+        return whole([row.terms(columns, scope) for row in found or []], rows)
 
     def inside(self, offset: int, width: int) -> Location:
         """The place of a part of a scalar's text."""
@@ -389,7 +389,8 @@ def _counted(count: int, what: str) -> str:
     return f"{count} {first.removesuffix('s') if count == 1 and first != 'entries' else first}{comma}{rest}"
 
 
-def _all(values: Sequence[T | None], count: int) -> tuple[T, ...] | None:
-    """The values, if none is missing."""
-    kept = tuple(value for value in values if value is not None)
-    return kept if len(kept) == len(values) == count else None
+def whole(values: Iterable[T | None], count: int | None = None) -> tuple[T, ...] | None:
+    """The values, if none is missing, and there are so many."""
+    kept = tuple(values)
+    found = tuple(value for value in kept if value is not None)
+    return found if len(found) == len(kept) and count in (None, len(kept)) else None

@@ -14,7 +14,7 @@ from tubecert.spec.document import Scalar
 from tubecert.spec.keys import PAIR, YES, Kind, entry, expressions, inside, key, number, section
 from tubecert.spec.names import Names
 from tubecert.spec.plan import Trajectory
-from tubecert.spec.reader import Field
+from tubecert.spec.reader import Field, whole
 from tubecert.spec.values import Matrix, Term, Vector
 
 CONTROLLERS: Final = ("nominal", "ccm", "reference", "l1")
@@ -53,11 +53,8 @@ def _polygon(field: Field, names: Names) -> Matrix | None:
         return field.fail(
             codes.WRONG_SHAPE, f"{field.path} has {len(items)} corners; it needs 3 to {MAX_VERTICES}"
         )
-    corners = [item.numbers(2, names.values) for item in items]
-    found = tuple(corner for corner in corners if corner is not None)
-    if len(found) < len(items):
-        return None
-    for i, j in _crossings(found):
+    found = whole(item.numbers(2, names.values) for item in items)
+    for i, j in _crossings(found or ()):
         message = f"{field.path}: the edges from corners {i + 1} and {j + 1} touch or cross"
         help = "list the corners once, in the order in which one meets them going round"
         return items[j].fail(codes.RANGE, message, help)
@@ -156,9 +153,7 @@ def read_obstacles(field: Field, names: Names) -> tuple[Obstacle, ...] | None:
         return None
     if len(items) > MAX_OBSTACLES:
         return field.fail(codes.LIMIT, f"there are {len(items)} obstacles; at most {MAX_OBSTACLES} are read")
-    found = [_obstacle(item, names) for item in items]
-    sound = tuple(own for own in found if own)
-    return sound if len(sound) == len(found) else None
+    return whole(_obstacle(item, names) for item in items)
 
 
 def _obstacle(field: Field, names: Names) -> Obstacle | None:

@@ -28,7 +28,7 @@ from tubecert.spec.instead import glued
 from tubecert.spec.keys import NUMBER, SIZE, each, entry, expressions, form, key, numbers_text, section
 from tubecert.spec.lookup import SLOPES, TABLE
 from tubecert.spec.names import MAX_STATES, Names, key_field
-from tubecert.spec.reader import Field
+from tubecert.spec.reader import Field, whole
 from tubecert.spec.values import Output, Term, TermMatrix, Vector
 
 MAX_COLUMNS: Final = 32
@@ -287,9 +287,8 @@ def _combined(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | N
     entries = field.mapping(required=names.inputs)
     if entries is None or len(entries) < len(names.inputs):
         return None
-    found = [_read_bounds(entries[name], names, needed) for name in names.inputs]
-    parts = [part for part in found if part is not None]
-    if len(parts) < len(found):
+    parts = whole(_read_bounds(entries[name], names, needed) for name in names.inputs)
+    if parts is None:
         return None
     total: dict[str, Fraction | None] = {}
     for name in BOUNDS.keys:
@@ -306,9 +305,7 @@ def _bound(field: Field, names: Names, columns: int | None) -> Fraction | Vector
     if not isinstance(field.node, ListNode):
         return field.number(names.values, least=0, side="above")
     items = field.items(columns, "numbers, one per column of E") or []
-    sizes = [item.number(names.values, least=0, side="above") for item in items]
-    found = tuple(size for size in sizes if size is not None)
-    return found if found and len(found) == len(sizes) else None
+    return whole(item.number(names.values, least=0, side="above") for item in items) or None
 
 
 def _shape(field: Field, names: Names) -> TermMatrix | None:

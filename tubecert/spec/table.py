@@ -24,7 +24,7 @@ from tubecert.spec.document import Scalar
 from tubecert.spec.interpolation import DIGITS, rounded
 from tubecert.spec.keys import key, section
 from tubecert.spec.names import TIME, Names
-from tubecert.spec.reader import Field
+from tubecert.spec.reader import Field, whole
 from tubecert.spec.scope import MODERATE, out_of_range
 from tubecert.spec.sheet import ENOUGH, Cell, Sheet, number, opened, rows
 from tubecert.spec.values import Interpolation, Knots, Table
@@ -50,9 +50,7 @@ _COLUMN: Final = section(Column)
 def _read_columns(field: Field, names: Names) -> tuple[Column, ...] | None:
     """The columns of t, the states and the inputs."""
     fields = field.mapping(optional=_variables(names)) or {}
-    found = [_read_column(name, fields.get(name), names) for name in _variables(names)]
-    sound = tuple(column for column in found if column is not None)
-    return sound if len(sound) == len(found) else None
+    return whole(_read_column(name, fields.get(name), names) for name in _variables(names))
 
 
 def _read_column(name: str, field: Field | None, names: Names) -> Column | None:
