@@ -64,9 +64,13 @@ def written_to(
 
 
 def npz(arrays: Mapping[str, NDArray[np.generic]]) -> bytes:
-    """Arrays as the bytes of a file of numpy."""
+    """Arrays as the bytes of a file of numpy; who interrupts has them without waiting for their compression."""
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    try:
+        np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    except KeyboardInterrupt:
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
 
 

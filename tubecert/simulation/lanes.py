@@ -7,6 +7,7 @@ an exact flow within the step, it adds to them (`System`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
@@ -97,19 +98,19 @@ def follow(system: System) -> Found:
             slope = system.at(step, 0, x)
             record.see(step, x, slope)
             if step < len(length) - 1:
-                x = _stepped(system, step, length[step], x, slope)
+                x = stepped(partial(system.at, step), x, length[step], slope) + system.step(step)
             if record.all_stopped(step):
                 break
         return record.closed()
 
 
-def _stepped(system: System, step: int, length: float, x: Array, slope: Array) -> Array:
-    """x at the end of a step."""
+def stepped(at: Callable[[int, Array], Array], x: Array, length: float, slope: Array) -> Array:
+    """x after a step of the classical Runge-Kutta method, from the slopes `at` stages; that of the first is given."""
     total = slope
     for stage in (1, 2, 3):
-        slope = system.at(step, stage, x + SHARES[stage] * length * slope)
+        slope = at(stage, x + SHARES[stage] * length * slope)
         total = total + _WEIGHTS[stage] * slope
-    return np.asarray(x + length / 6 * total + system.step(step))
+    return np.asarray(x + length / 6 * total)
 
 
 class _Record:

@@ -1,6 +1,6 @@
 """Random plans of a family, as lanes: square waves as inputs, steered back where x* comes near the edge of P.
 
-In: the discrete linear model about the middle of boxes P (n, 2) and Q (m, 2), draws in [0, 1). Whether a plan
+In: the linear model about the middle of boxes P (n, 2) and Q (m, 2), draws in [0, 1). Whether a plan
 keeps to P is looked at by who draws it. Trusted: no.
 """
 
@@ -12,6 +12,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.simulation.lanes import SHARES, stepped
 
 Slope: TypeAlias = Callable[[float, Array], Array]
 _RICCATI: Final = 2000  # steps of the recursion
@@ -28,25 +29,30 @@ def waves(draws: Array, samples: int, k: float) -> Array:
 
 
 def integrated(slope: Slope, t: float, x: Array, length: float, count: int) -> Array:
-    """The states (n, N) a `length` later, by `count` steps of the classical Runge-Kutta method."""
+    """The states (n, N) a `length` later, by `count` Runge-Kutta steps."""
     h = length / count
     for s in (t + i * h for i in range(count)):
-        a = slope(s, x)
-        b = slope(s + h / 2, x + h / 2 * a)
-        c = slope(s + h / 2, x + h / 2 * b)
-        d = slope(s + h, x + h * c)
-        x = x + h / 6 * (a + 2 * (b + c) + d)
+
+        def at(stage: int, z: Array, s: float = s) -> Array:
+            return slope(s + SHARES[stage] * h, z)
+
+        x = stepped(at, x, h, slope(s, x))
     return x
 
 
 class Steering:
-    """What keeps plans in P: inputs in Q as wished, but more and more a linear feedback near its edge.
+    """What keeps plans in P: inputs in Q as wished, held for Ts, but more and more a linear feedback near its edge.
 
-    Near the edge is where off' `value` off, by the linear-quadratic problem of x+ = A x + B u with these boxes as
+    Near the edge is where off' `value` off, by the linear-quadratic problem of x' = A x + B u with these boxes as
     weights, nears 1, which it has where its ellipsoid leaves P.
     """
 
-    def __init__(self, A: Array, B: Array, P: Array, Q: Array) -> None:
+    def __init__(self, A: Array, B: Array, Ts: float, P: Array, Q: Array) -> None:
+        from scipy.linalg import expm
+
+        n, m = B.shape
+        block = expm(np.vstack([np.hstack([A, B]), np.zeros((m, n + m))]) * Ts)
+        A, B = block[:n, :n], block[:n, n:]
         (self.x, self.half), (self.u, self.reach) = (
             (box.mean(axis=1)[:, None], np.ptp(box, axis=1)[:, None] / 2) for box in (P, Q)
         )

@@ -200,11 +200,10 @@ def follow(
 def _along(
     setting: Setting, loops: Sequence[Loop], plans: Sequence[Plan], seed: int, each: int, first: int
 ) -> list[Runs]:
-    """Every loop along all plans, from this number on; output times are knots, where steps end anyway."""
-    knots, batches = plans[0].knots, list[list[Batch]]()
-    times = setting.times if knots is None else np.array(knots.t, dtype=float)
+    """Every loop along all plans, from this number on."""
+    batches = list[list[Batch]]()
     for number, plan in enumerate(plans, first):
         own = cases(setting.along(plan), seed, range(number * each, (number + 1) * each))
-        batches.append([own.of(replace(loop.along(plan).problem, times=times)) for loop in loops])
+        batches.append([own.of(loop.along(plan).problem) for loop in loops])
     runs = integrate([batch for part in batches for batch in part], tolerance=setting.tolerance)
     return [joined([run.with_only(_KEPT) for run in runs[i :: len(loops)]]) for i in range(len(loops))]

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
 from math import ceil
 from typing import Final
 
 import numpy as np
-from scipy.linalg import expm
 
 from tubecert.digits import near
 from tubecert.enclosure.interval import Array
@@ -31,9 +29,7 @@ from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 
 _KNOTS: Final = (100, 2000)  # of a plan, at least and at most
 _PACE: Final = 0.05  # |A| times the time between two of them
-_WIDEST: Final = (
-    16  # times the square of the ellipsoid from whose edge plans turn back, which is inside of the box
-)
+_WIDEST: Final = 16  # times the square of the ellipsoid, in the box, from whose edge plans turn back
 _LANES: Final = 25  # plans that are drawn at once
 _TRIES: Final = 20  # draws of a plan, until one keeps to the boxes
 _INSIDE: Final = 1e-3  # of a box, which curves between knots stay within
@@ -80,17 +76,13 @@ def drawing_of(spec: Spec, model: ControlAffineModel, horizon: float) -> Drawing
     half = np.maximum(np.ptp(P, axis=1) / 2, _SECANT)
     pace = np.linalg.norm(A * half / half[:, None], 2)  # 1/s, whatever the units of the states
     count = int(np.clip(ceil(pace * horizon / _PACE), *_KNOTS))
-    block = np.zeros((len(A) + len(B.T),) * 2)
-    block[: len(A)] = np.hstack([A, B]) * horizon / count
-    discrete = expm(block)[: len(A)]
-    steering = Steering(discrete[:, : len(A)], discrete[:, len(A) :], P, Q)
     return Drawing(
         model=model,
         bundle=bundle,
         horizon=Fraction(repr(horizon)),
         drift=drift,
         count=count,
-        steering=steering,
+        steering=Steering(A, B, horizon / count, P, Q),
     )
 
 
@@ -131,34 +123,26 @@ def _drawn(drawing: Drawing, seed: int, numbers: Sequence[int], trial: int) -> I
     draws = np.stack([np.random.default_rng(each).random(drawing.draws) for each in seeds], axis=1)
     steer, count, length = drawing.steering, drawing.count, float(drawing.horizon) / drawing.count
     n, m = len(steer.x), len(steer.u)
-    wide = _WIDEST ** (draws[0] * (1 - trial / _TRIES))
-    x, u = [steer.inside(draws[-n:], wide)], []
+    wide, most = _WIDEST ** (draws[0] * (1 - trial / _TRIES)), _DEFECT * float(drawing.bundle.defect)
+    x, u = [steer.inside(draws[-n:], wide)], list[Array]()
     with np.errstate(all="ignore"):  # plans that go astray
         for k in range(count):
-            wish = waves(draws[1:-n], count, k)
-            u.append(steer.input(x[-1], wish[:m], wide))
-            slope = partial(_slope, drawing, u[-1], _missed(drawing, wish[m:]))
+            wish, free = np.split(waves(draws[1:-n], count, k), [m])
+            free = free * (steer.half > 0)
+            missed = most * free / np.maximum(1.0, np.linalg.norm(free, axis=0))
+            u.append(steer.input(x[-1], wish, wide))
+
+            def slope(t: float, z: Array, u: Array = u[-1], missed: Array = missed) -> Array:
+                return drawing.speed(t, z, u) + missed
+
             x.append(integrated(slope, k * length, x[-1], length, 2))
     t = tuple(drawing.horizon * k / count for k in range(count + 1))
     paths, inputs = np.stack(x), np.stack([*u, u[-1]])  # (K + 1, n, N), (K + 1, m, N)
     for lane in np.flatnonzero(np.all([steer.within(row) for row in paths], axis=0)).tolist():
-        exact, held = _exact(paths[..., lane]), _exact(inputs[..., lane])
+        exact, held = (
+            tuple(tuple(map(Fraction, row)) for row in rows[..., lane].tolist()) for rows in (paths, inputs)
+        )
         yield numbers[lane], Knots(t=t, x=exact, u=held, interpolation="hold")
-
-
-def _exact(rows: Array) -> tuple[tuple[Fraction, ...], ...]:
-    return tuple(tuple(map(Fraction, row)) for row in rows.tolist())
-
-
-def _missed(drawing: Drawing, wish: Array) -> Array:
-    """What x* misses of the dynamics (n, N), as long as a cubic allows."""
-    wish = wish * (drawing.steering.half > 0)
-    length = np.maximum(1.0, np.linalg.norm(wish, axis=0))
-    return np.asarray(_DEFECT * float(drawing.bundle.defect) * wish / length)
-
-
-def _slope(drawing: Drawing, u: Array, p: Array, t: float, x: Array) -> Array:
-    return drawing.speed(t, x, u) + p
 
 
 def _belongs(drawing: Drawing, plan: PiecewisePlan) -> float | None:

@@ -23,11 +23,11 @@ from tubecert.kinds import DISTANCE, name_of
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulation.adaptive.loops import Controller, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.reading import Certified, Promise, certified_plan, promise
+from tubecert.simulation.adaptive.times import output_times
 from tubecert.simulation.adaptive.uncertainty import Class, Sources, class_of
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
 
-TIMES: Final = 251  # output times of the loops that are drawn
 CHOSEN: Final = "chosen, not certified"
 _LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
 _TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
@@ -126,7 +126,7 @@ def setting_of(
         model=model,
         plan=single,
         horizon=horizon,
-        times=np.linspace(0.0, horizon, TIMES),
+        times=output_times(single, horizon),
         x0=centre if plan is not None else np.array([float(value) for value in spec.x0]),
         centre=centre,
         within=0.0 if spec.within is None else float(spec.within),

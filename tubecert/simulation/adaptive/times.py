@@ -18,6 +18,7 @@ from tubecert.trajectory import Plan
 
 _SAME = 1e-11  # of the horizon: times that differ by less are one
 _FEWEST_STEPS = 64
+TIMES = 251  # output times of the loops that are drawn
 START, MIDDLE, END = range(3)  # of a step: the places of its plans
 
 
@@ -44,14 +45,14 @@ class Grid(NamedTuple):
 def corners(problem: LoopProblem, plans: Sequence[Plan]) -> Array:
     """Times (C,) that must be ends of steps."""
     end = problem.horizon
-    kinks = np.concatenate([np.zeros(0), *(_corners_of(plan.knots) for plan in plans if plan.knots)])
+    kinks = np.concatenate([np.zeros(0), *(corners_of(plan.knots) for plan in plans if plan.knots)])
     every = np.unique(np.minimum(np.concatenate([[0.0, end], problem.times, kinks[kinks < end]]), end))
     t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
     t[-1] = end
     return np.asarray(t)
 
 
-def _corners_of(knots: Knots) -> Array:
+def corners_of(knots: Knots) -> Array:
     """Times that no step may straddle: where u* has corners, or until when it is held; (K,)."""
     values = knots.u
     if knots.interpolation == "hermite-simpson":
@@ -65,6 +66,14 @@ def _corners_of(knots: Knots) -> Array:
     ]
     inner = zip(knots.t[1:], slopes, slopes[1:], strict=False)
     return np.array([float(t) for t, a, b in inner if a != b])
+
+
+def output_times(plan: Plan, horizon: float) -> Array:
+    """About `TIMES` times, or more: corners of the plan if it has as many, for steps end there anyway."""
+    kinks = np.zeros(0) if plan.knots is None else corners_of(plan.knots)
+    inner = kinks[kinks < horizon * (1 - _SAME)]
+    every = len(inner) // (TIMES - 1)
+    return np.array([0.0, *inner[every - 1 :: every], horizon]) if every else np.linspace(0.0, horizon, TIMES)
 
 
 def nearest(t: Array, wanted: Array) -> Array:

@@ -135,14 +135,14 @@ class Campaign:
         return self.attack.setting
 
     @cached_property
-    def all(self) -> Found:
-        """Peaks of all lanes."""
+    def peaks(self) -> Found:
+        """Those of all lanes."""
         return combined([seen.found for seen in self.found], lambda *parts: np.concatenate(parts, axis=-1))
 
     @property
     def runs(self) -> int:
         """How many were made."""
-        return len(self.all.stopped)
+        return len(self.peaks.stopped)
 
     @property
     def aimed(self) -> Flags:
@@ -156,12 +156,16 @@ class Campaign:
         `value` of `bound`; and what each lane may be wrong by, as a share of a half-width, `error` (N,).
         """
         own, names = self.setting, self.setting.names
-        share = np.maximum(0.0, np.stack([self.all.peak[name] for name in names]))
-        when = np.stack([self.all.peak_time[name] for name in names])
+        share = np.maximum(0.0, np.stack([self.peaks.peak[name] for name in names]))
+        when = np.stack([self.peaks.peak_time[name] for name in names])
         samples = np.minimum((when / own.Ts + _ROUNDING).astype(np.int64), own.samples - 1)
         bound = np.stack([own.at(samples[i])[i] for i in range(len(names))])
         error = np.concatenate([seen.error for seen in self.found])
         return {"share": share, "when": when, "value": share * bound, "bound": bound, "error": error}
+
+    def all(self, name: str) -> Array:
+        """One of the `arrays`."""
+        return self.arrays[name]
 
     @property
     def profile(self) -> Array:
@@ -209,7 +213,7 @@ class Campaign:
     def went(self) -> dict[str, Went]:
         """Where every input was."""
         proven = {use.input: (float(use.range[0]), float(use.range[1])) for use in self.setting.result.inputs}
-        low, high = _finite(self.all.least.min(axis=1)), _finite(self.all.greatest.max(axis=1))
+        low, high = _finite(self.peaks.least.min(axis=1)), _finite(self.peaks.greatest.max(axis=1))
         ends = zip(self.setting.spec.inputs, low.tolist(), high.tolist(), strict=True)
         return {name: Went(least, greatest, proven.get(name)) for name, least, greatest in ends}
 
@@ -217,7 +221,7 @@ class Campaign:
     def passed(self) -> list[Passed]:
         """How near runs came to each obstacle, in their order."""
         proven = {own.index for own in self.setting.result.clearance if own.verdict is Verdict.CERTIFIED}
-        gaps = [_finite(-self.all.peak[gap(i)]) for i in range(len(self.setting.spec.obstacles))]
+        gaps = [_finite(-self.peaks.peak[gap(i)]) for i in range(len(self.setting.spec.obstacles))]
         return [Passed(float(own.min()), int(own.argmin()), i in proven) for i, own in enumerate(gaps)]
 
     @cached_property
@@ -230,7 +234,7 @@ class Campaign:
         most = max((max(abs(went.least), abs(went.greatest)) for went in self.went.values()), default=0.0)
         room = np.concatenate([np.ones(n), gain])[:, None] * error
         room[n:] += _SINGLE * most / inputs.min(axis=1)[:, None]
-        beyond = (self.arrays["share"] > 1 + _ROUNDING + room).any(axis=0) | (self.all.stopped == DIVERGED)
+        beyond = (self.arrays["share"] > 1 + _ROUNDING + room).any(axis=0) | (self.peaks.stopped == DIVERGED)
         return np.flatnonzero(beyond).tolist()
 
     @property

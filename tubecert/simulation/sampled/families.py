@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
-from tubecert.loop_design.widths import flow
 from tubecert.simulation.plans import Steering, integrated, waves
 from tubecert.simulation.sampled.setting import Setting
 from tubecert.spec.types import Bundle
@@ -66,7 +65,7 @@ def courses(setting: Setting, bundle: Bundle, draws: Array) -> Course:
     """A random plan for every lane from its draws, `drawn(setting)` of each (.., N); N plans."""
     (n, m), K, acts, hold = setting.loop.B.shape, setting.samples, setting.acts, setting.result.claim.hold
     boxes = (np.array(box, dtype=float) for box in (bundle.x, bundle.u))
-    steer = Steering(*flow(setting.loop.A, setting.loop.B, setting.Ts), *boxes)
+    steer = Steering(setting.loop.A, setting.loop.B, setting.Ts, *boxes)
     rate = None if bundle.input_rate is None else np.array(bundle.input_rate, dtype=float)[:, None]
     x, u = steer.inside(draws[-n:]), steer.u + np.zeros((1, draws.shape[1]))
     path, held, ends = [x], [], np.full(draws.shape[1], K + 1)
