@@ -32,7 +32,7 @@ ELSEWHERE = {
     "docs/howto/infeasible.md": "test_howto.py",
     "docs/howto/metric.md": "test_howto.py",
     "docs/howto/plan.md": "test_howto.py",
-    "docs/architecture.md": "test_architecture_page.py: rooms, who is trusted, sizes",
+    "docs/architecture.md": "test_architecture_page.py: rooms, their sizes, who is trusted",
     "docs/reference/codes.md": "tests/spec/test_schema.py, tests/cli/test_everyday.py: fragments of `explain`",
     **{
         path.relative_to(
