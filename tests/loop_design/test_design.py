@@ -103,6 +103,20 @@ def test_a_constant_that_is_unknown_is_learnt():
 
 
 @pytest.mark.slow
+def test_a_parameter_that_does_nothing_at_rest_is_no_component_of_the_observer():
+    """Its eta is bounded by the least float above 0: nothing corrects it, and a loop with it would not be stable."""
+    text = """tubecert: 1
+name: arm
+system: {states: [q, w], inputs: [u], parameters: {m: [0.95, 1.05]}, f: [w, 19.62*sin(q)], B: [[0], [4/m]]}
+safe_set: {q: [-0.8, 0.8], w: [-4, 4]}
+trajectory: {kind: equilibrium, at: [0, 0]}
+hardware: {rate: 200, noise: {q: 0.002, w: 0.02}}
+limits: {u: [-3, 3]}
+"""
+    assert certify(load_text(text, "arm.yaml")).result.verdict == "certified"
+
+
+@pytest.mark.slow
 def test_a_wish_is_paid_by_other_states():
     plain = design(double())
     wished = design(double(wishes=[np.inf, 0.8 * plain.W[1]]))

@@ -140,9 +140,10 @@ def _riccati(A: Array, G: Array, Q: Array) -> Array:
 def observe(plant: Plant) -> Observer:
     """The observer of a plant whose units are its own.
 
-    Components of eta that do what others do cannot be told apart by any filter: they are one for the observer.
+    Components of eta that do what others do cannot be told apart by any filter: they are one for the observer. One that
+    does nothing is none.
     """
-    active = np.flatnonzero((plant.magnitude > 0) & np.abs(plant.H).any(axis=0))
+    active = np.flatnonzero((plant.magnitude > 0) & (np.abs(plant.H) > CLEAN).any(axis=0))
     kept = active
     if len(active):
         triangle, pivots = qr(plant.H[:, active], mode="r", pivoting=True)
