@@ -185,7 +185,7 @@ def test_unique_geodesics_of_a_metric_that_varies_about_a_plan_that_moves():
     )
     case = case_of(certified(text, conditions="distance"), 20_000)
     place = case.place
-    value = case.metric.geodesics.value.above
+    value = case.metric.unique_geodesics.value.above
     with ctx.workprec(64):
         assert geodesics.unique(place, value).holds
         sampled = [

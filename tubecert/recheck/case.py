@@ -15,8 +15,9 @@ from tubecert.recheck.coordinates import Coordinates
 from tubecert.recheck.curve import Curve
 from tubecert.recheck.document import Enclosure, digest
 from tubecert.recheck.examination import SHARP
+from tubecert.recheck.kinds.kind import Section
 from tubecert.recheck.place import Place
-from tubecert.recheck.result import INFIMA, MEASURED, MetricSection, Result, Sections, TubeSection
+from tubecert.recheck.result import INFIMA, MEASURED, MetricSection, Result, TubeSection
 from tubecert.recheck.system import System, curve_of, system_of
 from tubecert.recheck.terms import all_zero
 
@@ -62,7 +63,7 @@ class Case:
         return self.result.constants
 
     @cached_property
-    def sections(self) -> Sections:
+    def sections(self) -> dict[str, Section]:
         """What is claimed of gains."""
         assert self.result.sections is not None
         return self.result.sections

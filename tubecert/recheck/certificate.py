@@ -13,30 +13,26 @@ from typing import Any
 
 from tubecert.recheck import wind
 from tubecert.recheck.coordinates import Coordinates
-from tubecert.recheck.document import Enclosure, Members, Node, digest, enclosure
+from tubecert.recheck.document import Enclosure, Members, Node, digest, each
 from tubecert.recheck.examines import not_examined
 from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.inputs import read_limited
-from tubecert.recheck.kinds.kind import VERDICTS
+from tubecert.recheck.kinds.kind import VERDICTS, Section
 from tubecert.recheck.kinds.table import KEYS, KINDS
-from tubecert.recheck.obstacles import read_cleared
+from tubecert.recheck.obstacles import Cleared
 from tubecert.recheck.plans import read_plan
 from tubecert.recheck.reasons import read_assumption, read_reason
 from tubecert.recheck.result import (
     MEASURED,
     Certificate,
     Claim,
-    Geodesics,
     MetricSection,
     Overrides,
     Plans,
     Result,
-    Sections,
     TubeSection,
-    Wind,
 )
 from tubecert.recheck.specification import Specification, read_specification
-from tubecert.recheck.specified.loop import DECIDES
 from tubecert.recheck.specified.numbers import Range, Rows
 from tubecert.recheck.specified.plant import Plant, Wanted, read_wanted
 from tubecert.recheck.specified.trajectory import read_start
@@ -91,26 +87,29 @@ def read_result(node: Node) -> Result:
     searched = any(key in own for key in last[2:])
     if verdict == "certified" or searched:  # the search comes last: everything else must be there
         own.require("metric", *last)
-    sections = _sections(own) if searched else None
+    sections = {kind.key: kind.read(own[kind.key]) for kind in KINDS} if searched else None
     result = Result(
         verdict=verdict,
         specification=specification,
         effective_hash=spec["effective_hash"].text(),
         claim=_claim(own["claim"], states, specification.plant.inputs),
-        overrides=_overrides(own["overrides"], spec["effective"]),
+        overrides=own["overrides"].record(
+            Overrides, settings=lambda item: read_settings(item, spec["effective"])
+        ),
         plan=read_plan(own["plan"], specification),
         safe_set=_box(own["safe_set"], states, Node.decimal),
-        assumptions=tuple(map(read_assumption, own["assumptions"].entries())),
+        assumptions=each(read_assumption)(own["assumptions"]),
         declared=_declared(own["declared"]),
         reasons=tuple(read_reason(item, len(states)) for item in own["reasons"].entries()),
         recipes=_recipes(own["proof"], sections),
         synthesised=own.get("synthesis", lambda item: read_wanted(item.closed("asked")["asked"])),
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, specification.plant)),
-        clearance=own.get("clearance", lambda item: tuple(map(read_cleared, item.entries()))) or (),
-        inputs=own.get("inputs", lambda item: tuple(map(read_limited, item.entries()))) or (),
+        clearance=own.get("clearance", each(lambda item: item.record(Cleared))) or (),
+        inputs=own.get("inputs", each(read_limited)) or (),
         constants=own.get("constants", lambda item: _constants(item, own, specification)),
         sections=sections,
+        decided_by=own["decided_by"].texts() if searched else (),
     )
     return _complete(node, result) if verdict == "certified" else result
 
@@ -121,7 +120,7 @@ def _complete(node: Node, result: Result) -> Result:
     assert metric is not None
     assert tube is not None
     parts: list[object] = [metric.lower_on_set, metric.upper_on_set, metric.lower, metric.upper]
-    parts.append(metric.geodesics)
+    parts.append(metric.unique_geodesics)
     if len(result.specification.plant.inputs) < len(result.specification.plant.states):
         parts += [metric.margin, metric.largest_rate]  # C2 says something
     if any(part is None for part in parts):
@@ -139,54 +138,21 @@ def _complete(node: Node, result: Result) -> Result:
 
 
 def _claim(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Claim:
-    keys = ("id", "horizon", "for_all_time", "period", "domain", "start", "uncertainty")
-    own = node.closed(*keys, optional=("plans", "wind", "parameters"))
-    return Claim(
-        id=own["id"].text(),
-        horizon=own.known("horizon", Node.exact),
-        for_all_time=own.known("for_all_time", Node.text),
-        period=own.known("period", Node.text),
-        domain=_box(own["domain"], states, Node.exact),
-        start=read_start(own["start"], states),
-        uncertainty=own["uncertainty"].text(),
-        plans=own.get("plans", lambda item: _plans(item, states, inputs)),
-        wind=own.get("wind", _wind),
-        parameters=own.get("parameters", _parameters),
+    def plans(item: Node) -> Plans:
+        x, u = (lambda own, names=names: _box(own, names, Node.exact) for names in (states, inputs))
+        return item.record(Plans, x=x, u=u)
+
+    return node.record(
+        Claim,
+        domain=lambda item: _box(item, states, Node.exact),
+        start=lambda item: read_start(item, states),
+        plans=plans,
     )
-
-
-def _parameters(node: Node) -> dict[str, Range]:
-    return {name: (low.exact(), high.exact()) for name, side in node.items() for low, high in [side.pair()]}
-
-
-def _wind(node: Node) -> Wind:
-    own = node.closed("bound", optional=("rate",))
-    return Wind(bound=own["bound"].exact(), rate=own.get("rate", Node.exact))
-
-
-def _plans(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Plans:
-    own = node.closed("x", "u", "defect")
-    x, u = _box(own["x"], states, Node.exact), _box(own["u"], inputs, Node.exact)
-    return Plans(x=x, u=u, defect=own["defect"].exact())
 
 
 def _box(node: Node, states: tuple[str, ...], read: Callable[[Node], Fraction]) -> dict[str, Range]:
     sides = node.closed(*states)
     return {name: (read(low), read(high)) for name in states for low, high in [sides[name].pair()]}
-
-
-def _overrides(node: Node, effective: Node) -> Overrides:
-    keys = ("epsilon", "rho_a", "bandwidth", "adaptation_rate", "conditions", "metric", "settings")
-    own = node.closed(optional=keys)
-    return Overrides(
-        epsilon=own.get("epsilon", Node.decimal),
-        rho_a=own.get("rho_a", Node.decimal),
-        bandwidth=own.get("bandwidth", Node.decimal),
-        adaptation_rate=own.get("adaptation_rate", Node.decimal),
-        conditions=own.get("conditions", lambda item: item.word(*DECIDES)),
-        metric=own.get("metric", Node.text),
-        settings=own.get("settings", lambda item: read_settings(item, effective)) or {},
-    )
 
 
 def read_settings(node: Node, effective: Node) -> dict[str, tuple[Fraction, Fraction]]:
@@ -227,39 +193,19 @@ def _declared(node: Node) -> dict[str, Fraction]:
 
 
 def _metric(node: Node, n: int) -> MetricSection:
-    enclosures = ("margin", "largest_rate", "lower_on_set", "upper_on_set", "lower", "upper")
-    own = node.closed("rate", "dual_metric", "verdict", optional=(*enclosures, "unique_geodesics"))
-    dual = own["dual_metric"].rows(n, n)
-    return MetricSection(
-        rate=own["rate"].decimal(),
-        dual_metric=tuple(tuple(e.text() for e in row) for row in dual),
-        verdict=own["verdict"].word(*VERDICTS),
-        margin=own.get("margin", enclosure),
-        largest_rate=own.get("largest_rate", enclosure),
-        lower_on_set=own.get("lower_on_set", enclosure),
-        upper_on_set=own.get("upper_on_set", enclosure),
-        lower=own.get("lower", enclosure),
-        upper=own.get("upper", enclosure),
-        geodesics=own.get("unique_geodesics", _geodesics),
+    return node.record(
+        MetricSection,
+        dual_metric=lambda item: tuple(tuple(e.text() for e in row) for row in item.rows(n, n)),
     )
 
 
-def _geodesics(node: Node) -> Geodesics:
-    own = node.closed("value", "holds")
-    return Geodesics(enclosure(own["value"]), own["holds"].flag())
-
-
 def _tube(node: Node, plant: Plant) -> TubeSection:
-    lengths = tuple(plant.lengths)
-    own = node.closed("epsilon", "rho_a", "rho", optional=("rho_r", "half_widths", "coordinates"))
-    widths = own.get("half_widths", lambda item: item.closed(*lengths))
-    return TubeSection(
-        epsilon=own["epsilon"].decimal(),
-        rho_a=own["rho_a"].decimal(),
-        rho=own["rho"].decimal(),
-        rho_r=own.get("rho_r", Node.decimal),
-        half_widths=None if widths is None else {name: widths[name].decimal() for name in lengths},
-        coordinates=own.get("coordinates", lambda item: _coordinates(item, len(plant.states))),
+    def widths(item: Node) -> dict[str, Fraction]:
+        own = item.closed(*plant.lengths)
+        return {name: own[name].decimal() for name in plant.lengths}
+
+    return node.record(
+        TubeSection, half_widths=widths, coordinates=lambda item: _coordinates(item, len(plant.states))
     )
 
 
@@ -285,24 +231,14 @@ def _constants(node: Node, result: Members, spec: Specification) -> dict[str, En
     if spec.plant.ranges:
         names += wind.OF_UNKNOWN
     own = node.closed(*names)
-    return {name: _constant(own[name]) for name in names}
-
-
-def _constant(node: Node) -> Enclosure:
-    own = node.closed("below", "above")
-    return Enclosure(own.known("below", Node.number), own.known("above", Node.number))
+    return {name: own[name].record(Enclosure) for name in names}
 
 
 # -- gains ---------------------------------------------------------------------------------------------------------
 
 
-def _sections(own: Members) -> Sections:
-    read = {kind.key: kind.read(own[kind.key]) for kind in KINDS}
-    return Sections(read, own["decided_by"].texts())
-
-
-def _recipes(node: Node, sections: Sections | None) -> dict[str, object]:
+def _recipes(node: Node, sections: dict[str, Section] | None) -> dict[str, object]:
     """What proves the gains of each kind that is certified; of another it would be examined by nothing."""
-    read = {} if sections is None else sections.by_key
+    read = sections or {}
     own = node.closed(optional=[key for key, section in read.items() if section.verdict == "certified"])
     return {kind.key: kind.read_recipe(own[kind.key]) for kind in KINDS if kind.key in own}

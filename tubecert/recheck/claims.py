@@ -208,7 +208,7 @@ def _constants(case: Case) -> Iterator[Claim]:
     if H0 is not None:
         yield Claim(f"h_initial <= {float(H0):.6g}", (*over, H0), lambda: start.uncertainty(place, H0))
     yield from _beside(case)
-    test = case.metric.geodesics
+    test = case.metric.unique_geodesics
     if test is not None and test.holds:
         value = test.value.above
         yield Claim(
@@ -251,7 +251,7 @@ def _gains(case: Case) -> Iterator[Claim]:
     sections, recipes = case.sections, case.result.recipes
     ground = Ground(setting=case.setting, constants=case.constants, depends=case.numbers)
     for kind in KINDS:
-        section, own = sections.by_key[kind.key], ground
+        section, own = sections[kind.key], ground
         missing = kind.uncovered(case.setting)
         if missing is not None:
             yield ground.claim(
@@ -267,7 +267,7 @@ def _gains(case: Case) -> Iterator[Claim]:
 def _inputs(case: Case, kind: Kind[Any, Any], ground: Ground) -> Iterator[Claim]:
     """What a kind adds to inputs that have limits."""
     bounds = {own.name: own.bounds[kind.key] for own in case.result.inputs if kind.key in own.bounds}
-    section, recipe = case.sections.by_key[kind.key], case.result.recipes.get(kind.key)
+    section, recipe = case.sections[kind.key], case.result.recipes.get(kind.key)
     if bounds:
         yield ground.claim(
             f"{kind.key}: what is added to u*",

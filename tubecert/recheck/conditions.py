@@ -17,6 +17,7 @@ from fractions import Fraction
 from flint import arb
 
 from tubecert.recheck.balls import Ball, exact, larger, root, smaller
+from tubecert.recheck.document import Node, reads
 from tubecert.recheck.system import System
 
 
@@ -144,10 +145,14 @@ USED = tuple(item.name for item in fields(Numbers))
 class Gains:
     """The gains of A and B: omega, Gamma, the g of A_m = -g I, R_H."""
 
-    bandwidth: Fraction
-    adaptation_rate: Fraction
-    predictor_gain: Fraction
-    projection_radius: Fraction
+    bandwidth: Fraction = reads(Node.decimal)
+    adaptation_rate: Fraction = reads(Node.decimal)
+    predictor_gain: Fraction = reads(Node.decimal)
+    projection_radius: Fraction = reads(Node.decimal)
+
+    def same(self, other: Gains) -> bool:
+        """Whether these are the gains of another one, whatever else that says."""
+        return all(getattr(self, item.name) == getattr(other, item.name) for item in fields(Gains))
 
     @property
     def sensible(self) -> bool:

@@ -99,8 +99,8 @@ def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
     if sections is None:
         return
     for kind in KINDS:
-        if kind.key in sections.by_key:
-            yield from kind.asked(sections.by_key[kind.key], given.gains)
+        if kind.key in sections:
+            yield from kind.asked(sections[kind.key], given.gains)
 
 
 def _synthesised(result: Result) -> Iterator[tuple[bool, str]]:
@@ -138,7 +138,7 @@ def _bounds(result: Result) -> Iterator[tuple[bool, str]]:
         "upper_on_set": metric.upper_on_set,
         "margin": metric.margin,
         "largest_rate": metric.largest_rate,
-        "unique_geodesics": None if metric.geodesics is None else metric.geodesics.value,
+        "unique_geodesics": None if metric.unique_geodesics is None else metric.unique_geodesics.value,
     }
     for name, pair in intervals.items():
         yield pair is None or pair.is_interval, f"metric.{name} is not an interval"
@@ -154,29 +154,29 @@ def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
     assert sections is not None
     assert metric is not None
     yield metric.verdict == "certified", f"{_CLAIMS_ONLY} metric.verdict is not"
-    deciding = sections.decided_by
+    deciding = result.decided_by
     yield bool(deciding) and len(set(deciding)) == len(deciding), "decided_by is not a list of sections"
     yield (
         _as_wanted(result, deciding),
         "decided_by is not what the specification, or --conditions, wants to decide",
     )
     for name in deciding:
-        section = sections.by_key.get(name)
+        section = sections.get(name)
         if section is None:
             yield False, f"decided_by names {name[:40]!r}, which is no section"
             return
         yield section.verdict == "certified", f"{_CLAIMS_ONLY} {name}, which decides, is not"
-    for name, section in sections.by_key.items():
+    for name, section in sections.items():
         whole = section.verdict != "certified" or not section.shortfalls
         yield whole, f"{name} is certified and lists shortfalls"
     yield from clearances.agrees(result.specification.obstacles, result.clearance)
-    yield from inputs.agrees(result.specification.limits, result.inputs, sections.by_key, deciding)
+    yield from inputs.agrees(result.specification.limits, result.inputs, sections, deciding)
     for reason in result.reasons:
         yield reason.verdict == "certified", f"{_CLAIMS_ONLY} a reason says otherwise"
         yield reason.claim == "gains_suffice", f"{_CLAIMS_ONLY} a reason is not that gains suffice"
         named = reason.parameters["section"]
         yield named in deciding, f"a reason names {str(named)[:40]!r}, which does not decide"
-        own = next(kind.said(sections.by_key[kind.key]) for kind in KINDS if kind.key == named)
+        own = next(kind.said(sections[kind.key]) for kind in KINDS if kind.key == named)
         same = all(value == own.get(key) for key, value in reason.parameters.items() if key != "section")
         yield same, f"a reason repeats {named} otherwise than it is"
         yield reason.at is None, "a reason of what is certified names a point"
@@ -190,12 +190,12 @@ def _as_wanted(result: Result, deciding: tuple[str, ...]) -> bool:
     letter = instead or wanted
     if letter != "all":
         return set(deciding) == {LETTERS[letter]}
-    return set(deciding) == {kind.key for kind in KINDS if kind.adapts and kind.key in result.sections.by_key}
+    return set(deciding) == {kind.key for kind in KINDS if kind.adapts and kind.key in result.sections}
 
 
 def assumptions(result: Result, s: System) -> Outcome:
     """The list of what is assumed is that of this format, each with the parameters of the specification."""
-    geodesics = None if result.metric is None else result.metric.geodesics
+    geodesics = None if result.metric is None else result.metric.unique_geodesics
     wanted = _assumed(s, geodesics)
     for own, named in zip(result.assumptions, wanted, strict=False):
         if own != named:

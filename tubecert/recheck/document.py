@@ -10,7 +10,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, field, fields
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
@@ -91,6 +91,19 @@ class Node:
             if key not in required and key not in optional:
                 raise Node(None, f"{self.path}.{key[:60]}").refused("is not known in this place")
         return Members(self, {key: self._member(key) for key in self.mapping()})
+
+    def record(self, kind: type[T], **own: Callable[[Node], Any]) -> T:
+        """An object with the fields of a data class and no others, each read as the class or as `own` says.
+
+        A field that has a default may be absent.
+        """
+        every = fields(kind)  # type: ignore[arg-type]
+        may = [f.name for f in every if not (f.default is MISSING and f.default_factory is MISSING)]
+        members = self.closed(*(f.name for f in every if f.name not in may), optional=may)
+        how = {f.name: own.get(f.name) or f.metadata["reads"] for f in every}
+        return kind(
+            **{name: read(members[name]) for name, read in how.items() if name in members or name not in may}
+        )
 
     def without(self, *keys: str) -> Node:
         """The object without these keys, which somebody else reads; at the same place."""
@@ -179,10 +192,6 @@ class Node:
         """A list of numbers, or texts that are decimals or quotients."""
         return tuple(item.decimal() for item in self.entries())
 
-    def exacts(self) -> tuple[Fraction, ...]:
-        """A list of texts that stand for numbers."""
-        return tuple(item.exact() for item in self.entries())
-
     def pair(self) -> tuple[Node, Node]:
         """Two values."""
         first, second = self.sized(2)
@@ -198,6 +207,31 @@ class Node:
     def rows(self, p: int, q: int) -> list[list[Node]]:
         """The items of a matrix of known size."""
         return [row.sized(q) for row in self.sized(p)]
+
+
+def reads(how: Callable[[Node], Any]) -> Any:
+    """A field that `Node.record` reads in this way."""
+    return field(metadata={"reads": how})
+
+
+def may(how: Callable[[Node], Any]) -> Any:
+    """The same of a member that may be absent: then it is None."""
+    return field(default=None, metadata={"reads": how})
+
+
+def nullable(how: Callable[[Node], T]) -> Callable[[Node], T | None]:
+    """A member that must be there, and may be null: then it says that there is nothing."""
+    return lambda node: None if node.value is None else how(node)
+
+
+def each(how: Callable[[Node], T]) -> Callable[[Node], tuple[T, ...]]:
+    """A list of such values."""
+    return lambda node: tuple(map(how, node.entries()))
+
+
+def one_of(*words: str) -> Callable[[Node], str]:
+    """One of several words."""
+    return lambda node: node.word(*words)
 
 
 class Members:
@@ -222,10 +256,6 @@ class Members:
     def get(self, key: str, reads: Callable[[Node], T]) -> T | None:
         """A member that may be absent."""
         return reads(self[key]) if key in self._members else None
-
-    def known(self, key: str, reads: Callable[[Node], T]) -> T | None:
-        """A member that must be there, and may be null: then it says that there is nothing."""
-        return None if self[key].value is None else reads(self[key])
 
 
 @lru_cache(maxsize=65_536)
@@ -321,8 +351,8 @@ def digest(data: Any) -> str:
 class Enclosure:
     """[below, above]; None where there is no bound."""
 
-    below: Fraction | None
-    above: Fraction | None
+    below: Fraction | None = reads(nullable(Node.number))
+    above: Fraction | None = reads(nullable(Node.number))
 
     @property
     def is_interval(self) -> bool:
@@ -330,9 +360,7 @@ class Enclosure:
         return self.below is None or self.above is None or self.below <= self.above
 
 
-def maybe(node: Node) -> Fraction | None:
-    """A number, or null."""
-    return None if node.value is None else node.number()
+maybe = nullable(Node.number)
 
 
 def enclosure(node: Node) -> Enclosure:

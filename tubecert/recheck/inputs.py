@@ -6,12 +6,12 @@ du D + R], where d(x*, x) <= D by the theorem of the kind and R is the radius of
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.recheck.cover import Outcome, stated, together
-from tubecert.recheck.document import Enclosure, Node, enclosure
+from tubecert.recheck.document import Enclosure, Node, enclosure, reads
 from tubecert.recheck.kinds.bounds import all_of, at_most
 from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements
 from tubecert.recheck.kinds.table import KEYS
@@ -25,10 +25,10 @@ from tubecert.recheck.terms import number
 class InputBound:
     """What is stated of an input in the loop of one kind."""
 
-    least: Fraction
-    greatest: Fraction
-    feedback: Fraction
-    adaptation: Fraction
+    least: Fraction = reads(Node.number)
+    greatest: Fraction = reads(Node.number)
+    feedback: Fraction = reads(Node.number)
+    adaptation: Fraction = reads(Node.number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,16 +55,8 @@ def read_limited(node: Node) -> Limited:
         verdict=own["verdict"].word(*VERDICTS),
         least=enclosure(plan["least"]),
         greatest=enclosure(plan["greatest"]),
-        bounds={key: found for key in KEYS if (found := bounds.get(key, _bound)) is not None},
+        bounds={key: bounds[key].record(InputBound) for key in KEYS if key in bounds},
     )
-
-
-def _bound(node: Node) -> InputBound:
-    own = node.closed("least", "greatest", "feedback", "adaptation")
-    least, greatest, feedback, adaptation = (
-        own[key].number() for key in ("least", "greatest", "feedback", "adaptation")
-    )
-    return InputBound(least, greatest, feedback, adaptation)
 
 
 def agrees(
@@ -115,10 +107,12 @@ def added(shares: Shares | None, bounds: Mapping[str, InputBound]) -> Outcome:
     """What feedback and adaptation add is at most what is stated with every input."""
     if shares is None:
         return Outcome(verdict="undecided", why="this kind says nothing of inputs")
-    return all_of(_outcomes(shares, bounds))
-
-
-def _outcomes(shares: Shares, bounds: Mapping[str, InputBound]) -> Iterator[Outcome]:
-    for bound in bounds.values():
-        yield at_most(shares.feedback, bound.feedback, "what feedback adds")
-        yield stated(shares.adaptation <= bound.adaptation, "adaptation may add more: R_H")
+    feedback, adaptation = shares
+    return all_of(
+        outcome
+        for bound in bounds.values()
+        for outcome in (
+            at_most(feedback, bound.feedback, "what feedback adds"),
+            stated(adaptation <= bound.adaptation, "adaptation may add more: R_H"),
+        )
+    )

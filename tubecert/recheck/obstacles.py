@@ -7,9 +7,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations, pairwise
 
-from tubecert.recheck.document import Enclosure, Node, enclosure
+from tubecert.recheck.document import Enclosure, Node, enclosure, one_of, reads
 
 Point = tuple[Fraction, Fraction]
+
+
+def _numbers(node: Node) -> Point:
+    x, y = node.pair()
+    return x.number(), y.number()
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,18 +32,18 @@ class Obstacle:
 class Shape:
     """Over the tube: W11, W22 <= `diagonal`, and W12 in `beside`."""
 
-    diagonal: Point
-    beside: Point
+    diagonal: Point = reads(_numbers)
+    beside: Point = reads(_numbers)
 
 
 @dataclass(frozen=True, slots=True)
 class Cleared:
     """What is stated of an obstacle."""
 
-    verdict: str
-    decides: bool
-    clearance: Enclosure
-    shape: Shape
+    verdict: str = reads(one_of("certified", "refuted", "undecided"))
+    decides: bool = reads(Node.flag)
+    clearance: Enclosure = reads(enclosure)
+    shape: Shape = reads(lambda node: node.record(Shape))
 
 
 def read_obstacle(node: Node, states: Sequence[str]) -> Obstacle:
@@ -70,22 +75,6 @@ def read_obstacle(node: Node, states: Sequence[str]) -> Obstacle:
 def _point(node: Node) -> Point:
     x, y = node.pair()
     return x.exact(), y.exact()
-
-
-def read_cleared(node: Node) -> Cleared:
-    """One of `result.clearance`."""
-    own = node.closed("verdict", "decides", "clearance", "shape")
-    shape = own["shape"].closed("diagonal", "beside")
-    diagonal, beside = (
-        (first.number(), second.number())
-        for first, second in (shape["diagonal"].pair(), shape["beside"].pair())
-    )
-    return Cleared(
-        verdict=own["verdict"].word("certified", "refuted", "undecided"),
-        decides=own["decides"].flag(),
-        clearance=enclosure(own["clearance"]),
-        shape=Shape(diagonal, beside),
-    )
 
 
 # -- polygons: what lies inside is only clear for those whose edges meet at common corners, and nowhere else

@@ -186,7 +186,7 @@ def _plan_exceeds(case: Case, name: str, at: Fraction | None) -> Outcome:
 def _gains_fail(result: Result, name: str) -> Outcome:
     """No margin of the section that is printed is proven; its upper end is not positive."""
     assert result.sections is not None
-    section = result.sections.by_key[name]
+    section = result.sections[name]
     if section.verdict == "certified":
         return stated(False, "the section is certified")
     ends = [item.margin.above for item in section.shortfalls]

@@ -123,9 +123,7 @@ def _refuted_beside(certificate: Certificate) -> Iterator[str]:
     """Sections and obstacles that are called refuted beside what is certified: why they are is not examined."""
     result = certificate.result
     if result.verdict == "certified" and result.sections is not None:
-        yield from (
-            f"{key}.verdict" for key, own in result.sections.by_key.items() if own.verdict == "refuted"
-        )
+        yield from (f"{key}.verdict" for key, own in result.sections.items() if own.verdict == "refuted")
         if any(own.verdict == "refuted" for own in result.clearance):
             yield "clearance.verdict"
 

@@ -10,25 +10,23 @@ from typing import ClassVar
 from tubecert.recheck.balls import Ball, exact, larger, root
 from tubecert.recheck.conditions import Setting, margin
 from tubecert.recheck.cover import Outcome, stated
-from tubecert.recheck.document import Enclosure, Node, enclosure
+from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds.bounds import all_of, at_least, at_most, margin_at_least, no_radius
-from tubecert.recheck.kinds.kind import VERDICTS, Ground, Kind, Section, Shares, read_shortfalls
+from tubecert.recheck.kinds.kind import Ground, Kind, Section, Shares
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AloneSection(Section):
     """The margin of dbar; an enclosure of sup D; below which |h| the theorem holds."""
 
-    margin: Enclosure | None
-    distance: Enclosure
-    uncertainty_limit: Fraction | None
-    ultimate_radius: Fraction | None
+    margin: Enclosure | None = reads(nullable(enclosure))
+    distance: Enclosure = reads(enclosure)
+    uncertainty_limit: Fraction | None = reads(maybe)
+    ultimate_radius: Fraction | None = reads(maybe)
 
 
-@dataclass(frozen=True, slots=True)
-class NoGains:
-    """The recipe of theorem 0: there is nothing to choose."""
+NoGains = tuple[()]  # there is nothing to choose
 
 
 class Alone(Kind[AloneSection, NoGains]):
@@ -40,17 +38,7 @@ class Alone(Kind[AloneSection, NoGains]):
 
     def read(self, node: Node) -> AloneSection:
         """The section `no_adaptation`."""
-        own = node.closed(
-            "verdict", "margin", "distance", "uncertainty_limit", "ultimate_radius", "shortfalls"
-        )
-        found = AloneSection(
-            verdict=own["verdict"].word(*VERDICTS),
-            margin=own.known("margin", enclosure),
-            distance=enclosure(own["distance"]),
-            uncertainty_limit=own.known("uncertainty_limit", Node.number),
-            ultimate_radius=own.known("ultimate_radius", Node.number),
-            shortfalls=read_shortfalls(own["shortfalls"]),
-        )
+        found = node.record(AloneSection)
         if found.verdict == "certified" and found.margin is None:
             raise node.refused("is certified without a margin")
         return found
@@ -58,7 +46,7 @@ class Alone(Kind[AloneSection, NoGains]):
     def read_recipe(self, node: Node) -> NoGains:
         """Nothing."""
         node.closed()
-        return NoGains()
+        return ()
 
     def said(self, section: AloneSection) -> dict[str, object]:
         """The margin."""
@@ -68,7 +56,7 @@ class Alone(Kind[AloneSection, NoGains]):
         """The feedback acts within sup D; nothing adapts."""
         del section, recipe
         n = ground.setting.n
-        return Shares(n.feedback_gain * supremum(ground.setting, n.h), Fraction(0))
+        return n.feedback_gain * supremum(ground.setting, n.h), Fraction(0)
 
     def claims(self, section: AloneSection, recipe: NoGains | None, ground: Ground) -> Iterator[Claim]:
         """The margin if it is certified; the bound of the distance and the largest uncertainty in any case."""

@@ -19,7 +19,7 @@ from tubecert.recheck.conditions import (
     own_distance_proof,
 )
 from tubecert.recheck.cover import Outcome, stated
-from tubecert.recheck.document import Enclosure, Node, enclosure
+from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds.bounds import (
     all_of,
@@ -31,36 +31,33 @@ from tubecert.recheck.kinds.bounds import (
     words,
 )
 from tubecert.recheck.kinds.kind import (
-    GAINS,
-    VERDICTS,
     Asked,
     Ground,
     Kind,
     Section,
     Shares,
     Statements,
-    read_gains,
-    read_shortfalls,
 )
 
 
-@dataclass(frozen=True, slots=True)
-class DistancePair:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistancePair(Gains):
     """A pair with its margin."""
 
-    gains: Gains
-    margin: Enclosure
-    ultimate_radius: Fraction | None
+    margin: Enclosure = reads(enclosure)
+    ultimate_radius: Fraction | None = reads(maybe)
 
 
-@dataclass(frozen=True, slots=True)
-class DistanceRecipe:
+_PAIR = nullable(lambda node: node.record(DistancePair))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistanceRecipe(Gains):
     """Y, e and S of theorem B at its gains."""
 
-    gains: Gains
-    speed: Fraction
-    prediction_error: Fraction
-    uncertainty: Fraction
+    speed: Fraction = reads(Node.decimal)
+    prediction_error: Fraction = reads(Node.decimal)
+    uncertainty: Fraction = reads(Node.decimal)
 
     @property
     def proof(self) -> DistanceProof:
@@ -76,10 +73,10 @@ class DistanceRecipe:
 class DistanceSection(Section):
     """The pairs of least bandwidth, of least rate, the one asked for."""
 
-    split: DistancePair | None
-    least_adaptation: DistancePair | None
-    asked: DistancePair | None
-    ultimate_radius: Fraction | None
+    split: DistancePair | None = reads(_PAIR)
+    least_adaptation: DistancePair | None = reads(_PAIR)
+    asked: DistancePair | None = reads(_PAIR)
+    ultimate_radius: Fraction | None = reads(maybe)
 
     @property
     def pairs(self) -> dict[str, DistancePair]:
@@ -96,25 +93,24 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
 
     def read(self, node: Node) -> DistanceSection:
         """The section `distance`."""
-        return _section(node)
+        found = node.record(DistanceSection)
+        if not found.pairs and found.verdict == "certified":
+            raise node.refused("has no pair of gains")
+        return found
 
     def read_recipe(self, node: Node) -> DistanceRecipe:
         """Gains, Y, e and S."""
-        own = node.closed(*GAINS, "speed", "prediction_error", "uncertainty")
-        speed, error, uncertainty = (
-            own[key].decimal() for key in ("speed", "prediction_error", "uncertainty")
-        )
-        return DistanceRecipe(read_gains(own), speed, error, uncertainty)
+        return node.record(DistanceRecipe)
 
     def asked(self, section: DistanceSection, given: Asked) -> Statements:
         """There is a pair that was asked for if gains were, and it has them."""
         own = section.asked
-        for name in ("bandwidth", "adaptation_rate"):
-            wanted: Fraction | None = getattr(given, name)
-            same = wanted is None or own is None or getattr(own.gains, name) == wanted
+        for name, wanted in given.items():
+            same = wanted is None or own is None or getattr(own, name) == wanted
             yield same, f"overrides.{name} is not what {self.key} judges"
-        yield own is None or given.anything, "distance.asked was not asked for"
-        other = given.anything and own is None and section.verdict == "certified"
+        anything = any(wanted is not None for wanted in given.values())
+        yield own is None or anything, "distance.asked was not asked for"
+        other = anything and own is None and section.verdict == "certified"
         yield not other, "distance is certified for gains that were not asked for"
 
     def said(self, section: DistanceSection) -> dict[str, object]:
@@ -125,11 +121,11 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
     def shares(self, section: DistanceSection, recipe: DistanceRecipe, ground: Ground) -> Shares | None:
         """The feedback acts within sup D of theorem B."""
         del section
-        bound = distance_bound(ground.setting, recipe.gains, recipe.proof)
+        bound = distance_bound(ground.setting, recipe, recipe.proof)
         if bound is None:
             return None
         feedback = ground.setting.n.feedback_gain * bound.supremum()
-        return Shares(feedback, recipe.gains.projection_radius)
+        return feedback, recipe.projection_radius
 
     def claims(
         self, section: DistanceSection, recipe: DistanceRecipe | None, ground: Ground
@@ -150,34 +146,6 @@ class Distance(Kind[DistanceSection, DistanceRecipe]):
             yield ground.claim("B: ultimate radius", (section,), lambda: _agreed(section, radius))
 
 
-# -- reading
-
-
-def _section(node: Node) -> DistanceSection:
-    keys = ("verdict", "split", "least_adaptation", "asked", "ultimate_radius", "shortfalls")
-    own = node.closed(*keys)
-    found = DistanceSection(
-        verdict=own["verdict"].word(*VERDICTS),
-        split=own.known("split", _pair),
-        least_adaptation=own.known("least_adaptation", _pair),
-        asked=own.known("asked", _pair),
-        ultimate_radius=own.known("ultimate_radius", Node.number),
-        shortfalls=read_shortfalls(own["shortfalls"]),
-    )
-    if not found.pairs and found.verdict == "certified":
-        raise node.refused("has no pair of gains")
-    return found
-
-
-def _pair(node: Node) -> DistancePair:
-    own = node.closed(*GAINS, "margin", "ultimate_radius")
-    radius = own.known("ultimate_radius", Node.number)
-    return DistancePair(read_gains(own), enclosure(own["margin"]), radius)
-
-
-# -- claims
-
-
 def _pair_claim(
     pair: DistancePair, recipe: DistanceRecipe | None, ground: Ground, *, by_recipe: bool
 ) -> Claim:
@@ -186,21 +154,21 @@ def _pair_claim(
 
     def examined() -> Outcome:
         if not by_recipe:
-            return _pair_holds(pair, setting, own_distance_proof(setting, pair.gains))
+            return _pair_holds(pair, setting, own_distance_proof(setting, pair))
         if recipe is None:
             return stated(False, "it has no recipe")
-        if recipe.gains != pair.gains:
+        if not recipe.same(pair):
             return stated(False, "the recipe is for other gains")
         return _pair_holds(pair, setting, recipe.proof)
 
     parts = (pair, recipe if by_recipe else None, by_recipe)
-    return ground.claim(f"B: sup D < dbar at {words(pair.gains)}", parts, examined)
+    return ground.claim(f"B: sup D < dbar at {words(pair)}", parts, examined)
 
 
 def _pair_holds(pair: DistancePair, setting: Setting, proof: DistanceProof) -> Outcome:
-    found = margin_at_least(_margin(setting, pair.gains, proof), pair.margin, "the distance")
+    found = margin_at_least(_margin(setting, pair, proof), pair.margin, "the distance")
     radius = pair.ultimate_radius
-    return ultimate(radius, setting, pair.gains, proof) if found.holds and radius is not None else found
+    return ultimate(radius, setting, pair, proof) if found.holds and radius is not None else found
 
 
 def _margin(setting: Setting, at: Gains, proof: DistanceProof) -> Ball:
@@ -216,7 +184,7 @@ def _told(pair: DistancePair, setting: Setting) -> Outcome:
     """Gains that were asked for and are not certified: their margin is true and not positive."""
     if pair.ultimate_radius is not None:
         return no_radius()
-    true = told(_own_margin(setting, pair.gains), pair.margin, "the distance")
+    true = told(_own_margin(setting, pair), pair.margin, "the distance")
     return all_of((true, not_shown_to_hold([pair.margin])))
 
 

@@ -9,9 +9,9 @@ from fractions import Fraction
 from typing import ClassVar, Generic, TypeVar
 
 from tubecert.recheck.balls import Ball
-from tubecert.recheck.conditions import Gains, Setting
+from tubecert.recheck.conditions import Setting
 from tubecert.recheck.cover import Outcome
-from tubecert.recheck.document import Enclosure, Members, Node, enclosure
+from tubecert.recheck.document import Enclosure, Node, each, enclosure, one_of, reads
 from tubecert.recheck.examination import SHARP, Claim
 
 VERDICTS = ("certified", "refuted", "undecided")
@@ -24,29 +24,20 @@ Statements = Iterator[tuple[bool, str]]
 class Shortfall:
     """A condition that is not proven, with its margin."""
 
-    condition: str
-    margin: Enclosure
+    condition: str = reads(Node.text)
+    margin: Enclosure = reads(enclosure)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """The section of a kind, read."""
 
-    verdict: str
-    shortfalls: tuple[Shortfall, ...]
+    verdict: str = reads(one_of(*VERDICTS))
+    shortfalls: tuple[Shortfall, ...] = reads(each(lambda node: node.record(Shortfall)))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
-    """Gains that the command line asked for; None: not asked for."""
-
-    bandwidth: Fraction | None
-    adaptation_rate: Fraction | None
-
-    @property
-    def anything(self) -> bool:
-        """Whether any was."""
-        return self.bandwidth is not None or self.adaptation_rate is not None
+Asked = Mapping[str, Fraction | None]
+"""Gains that the command line asked for, by name; None: not asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,13 +58,8 @@ class Ground:
         return Claim(name, (*self.depends, *parts), examine, SHARP)
 
 
-@dataclass(frozen=True, slots=True)
-class Shares:
-    """What is added to u* at most: |k| <= `feedback`, and `adaptation` bounds what adapts (0: nothing does)."""
-
-    feedback: Ball
-    adaptation: Fraction
-
+Shares = tuple[Ball, Fraction]
+"""What is added to u* at most: the bound of |k|, and what bounds what adapts (0: nothing does)."""
 
 S = TypeVar("S", bound=Section)
 R = TypeVar("R")
@@ -125,22 +111,3 @@ class Kind(ABC, Generic[S, R]):
         """What is added to u*, where the recipe is a proof; None if the theorem does not say."""
         del section, recipe, ground
         return None
-
-
-GAINS = ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
-
-
-def read_gains(own: Members) -> Gains:
-    """The four gains of A and B."""
-    return Gains(
-        bandwidth=own["bandwidth"].decimal(),
-        adaptation_rate=own["adaptation_rate"].decimal(),
-        predictor_gain=own["predictor_gain"].decimal(),
-        projection_radius=own["projection_radius"].decimal(),
-    )
-
-
-def read_shortfalls(node: Node) -> tuple[Shortfall, ...]:
-    """What is missing."""
-    parts = (item.closed("condition", "margin") for item in node.entries())
-    return tuple(Shortfall(own["condition"].text(), enclosure(own["margin"])) for own in parts)

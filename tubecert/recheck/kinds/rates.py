@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from typing import ClassVar
 
 from tubecert.recheck.conditions import Gains, Setting, derived, margins_26, own_distance_proof
 from tubecert.recheck.cover import Outcome, stated
-from tubecert.recheck.document import Enclosure, Node, enclosure
+from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
 from tubecert.recheck.examination import Claim
 from tubecert.recheck.kinds.bounds import (
     all_of,
@@ -22,16 +22,12 @@ from tubecert.recheck.kinds.bounds import (
     words,
 )
 from tubecert.recheck.kinds.kind import (
-    GAINS,
-    VERDICTS,
     Asked,
     Ground,
     Kind,
     Section,
     Shares,
     Statements,
-    read_gains,
-    read_shortfalls,
 )
 
 CONDITIONS = ("26a", "26b", "26c")
@@ -52,12 +48,16 @@ DERIVED = (
 Margins = dict[str, Enclosure]
 
 
-@dataclass(frozen=True, slots=True)
-class RatePair:
+def _margins(node: Node) -> Margins:
+    own = node.closed(*CONDITIONS)
+    return {claim: enclosure(own[claim]) for claim in CONDITIONS}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatePair(Gains):
     """A pair with its margins."""
 
-    gains: Gains
-    margins: Margins
+    margins: Margins = reads(_margins)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,8 +65,8 @@ class RateSection(Section):
     """The pair that the verdict is about, that of least rate."""
 
     pair: RatePair | None
-    ultimate_radius: Fraction | None
-    least_adaptation: RatePair | None
+    ultimate_radius: Fraction | None = reads(maybe)
+    least_adaptation: RatePair | None = reads(nullable(lambda node: node.record(RatePair)))
 
 
 class Rates(Kind[RateSection, Gains]):
@@ -81,7 +81,7 @@ class Rates(Kind[RateSection, Gains]):
 
     def read_recipe(self, node: Node) -> Gains:
         """The gains: nothing else is needed."""
-        return read_gains(node.closed(*GAINS))
+        return node.record(Gains)
 
     def derived(self, node: Node) -> tuple[str, ...]:
         """What follows from gains, where there are any."""
@@ -93,9 +93,8 @@ class Rates(Kind[RateSection, Gains]):
 
     def asked(self, section: RateSection, given: Asked) -> Statements:
         """The pair is the one asked for."""
-        for name in ("bandwidth", "adaptation_rate"):
-            wanted: Fraction | None = getattr(given, name)
-            same = wanted is None or section.pair is None or getattr(section.pair.gains, name) == wanted
+        for name, wanted in given.items():
+            same = wanted is None or section.pair is None or getattr(section.pair, name) == wanted
             yield same, f"overrides.{name} is not what {self.key} judges"
 
     def said(self, section: RateSection) -> dict[str, object]:
@@ -108,7 +107,7 @@ class Rates(Kind[RateSection, Gains]):
         """Of the distance theorem A says that it stays below dbar."""
         del section
         setting = ground.setting
-        return Shares(setting.n.feedback_gain * setting.reach, recipe.projection_radius)
+        return setting.n.feedback_gain * setting.reach, recipe.projection_radius
 
     def claims(self, section: RateSection, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
         """Constants, margins, radius."""
@@ -120,7 +119,7 @@ class Rates(Kind[RateSection, Gains]):
                 "A: ultimate radius", (section,), lambda: _radius_holds(section, radius, setting)
             )
         if least is not None:
-            name = f"A: (26a)-(26c) at {words(least.gains)}"
+            name = f"A: (26a)-(26c) at {words(least)}"
             yield ground.claim(name, (least,), lambda: _margins_hold(least, setting))
 
 
@@ -128,35 +127,19 @@ class Rates(Kind[RateSection, Gains]):
 
 
 def _section(node: Node) -> RateSection:
-    gains = (*GAINS, "margins")
-    own = node.closed(
-        "verdict",
-        *gains,
-        "ultimate_radius",
-        "least_adaptation",
-        "shortfalls",
+    """The gains that the verdict is about stand in the section itself, all of them or none."""
+    beside, gains = ("verdict", "ultimate_radius", "least_adaptation", "shortfalls"), fields(RatePair)
+    own = node.closed(*beside, *(item.name for item in gains))
+    present = [own[item.name].value is not None for item in gains]
+    section = RateSection(
+        pair=node.without(*beside).record(RatePair) if all(present) else None,
+        **{
+            item.name: item.metadata["reads"](own[item.name]) for item in fields(RateSection) if item.metadata
+        },
     )
-    verdict = own["verdict"].word(*VERDICTS)
-    present = [own[key].value is not None for key in gains]
-    if any(present) != all(present) or (verdict == "certified" and not all(present)):
+    if any(present) != all(present) or (section.verdict == "certified" and not all(present)):
         raise node.refused("has a part of its gains only")
-    return RateSection(
-        verdict=verdict,
-        pair=RatePair(read_gains(own), _margins(own["margins"])) if all(present) else None,
-        ultimate_radius=own.known("ultimate_radius", Node.number),
-        least_adaptation=own.known("least_adaptation", _pair),
-        shortfalls=read_shortfalls(own["shortfalls"]),
-    )
-
-
-def _pair(node: Node) -> RatePair:
-    own = node.closed(*GAINS, "margins")
-    return RatePair(read_gains(own), _margins(own["margins"]))
-
-
-def _margins(node: Node) -> Margins:
-    own = node.closed(*CONDITIONS)
-    return {claim: enclosure(own[claim]) for claim in CONDITIONS}
+    return section
 
 
 # -- claims
@@ -164,13 +147,15 @@ def _margins(node: Node) -> Margins:
 
 def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground: Ground) -> Iterator[Claim]:
     """What is claimed of the gains that the verdict is about."""
-    setting, at = ground.setting, pair.gains
+    setting, at = ground.setting, pair
     shown = {name: ground.constants[name] for name in DERIVED}
     yield ground.claim("A: derived constants", (at, shown), lambda: _derived_hold(shown, setting, at))
     if section.verdict == "certified":
         yield ground.claim(f"A: (26a)-(26c) at {words(at)}", (pair,), lambda: _margins_hold(pair, setting))
         yield ground.claim(
-            "A: its recipe", (pair, recipe), lambda: stated(recipe == at, "it is for other gains")
+            "A: its recipe",
+            (pair, recipe),
+            lambda: stated(recipe is not None and at.same(recipe), "it is for other gains"),
         )
     else:
         name = "A: its margins without a disturbance" if ground.silent else "A: what is told of it"
@@ -179,13 +164,13 @@ def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground:
 
 def _margins_hold(pair: RatePair, setting: Setting) -> Outcome:
     """(26a)-(26c) hold with the margins printed."""
-    found = margins_26(setting, pair.gains)
+    found = margins_26(setting, pair)
     return all_of(margin_at_least(found[claim], pair.margins[claim], f"({claim})") for claim in found)
 
 
 def _told(pair: RatePair, ground: Ground) -> Outcome:
     """The margins printed of what is not certified: each is true, and not all are positive but for a disturbance."""
-    found = margins_26(ground.setting, pair.gains)
+    found = margins_26(ground.setting, pair)
     true = all_of(told(found[claim], pair.margins[claim], f"({claim})") for claim in found)
     return true if ground.silent else all_of((true, not_shown_to_hold(pair.margins.values())))
 
@@ -194,7 +179,7 @@ def _radius_holds(section: RateSection, radius: Fraction, setting: Setting) -> O
     """The radius in the long run, by theorem B at the same gains."""
     if section.pair is None or section.verdict != "certified":
         return no_radius()
-    at = section.pair.gains
+    at = section.pair
     return ultimate(radius, setting, at, own_distance_proof(setting, at))
 
 

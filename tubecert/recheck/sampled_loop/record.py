@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from flint import arb_mat
 
 from tubecert.recheck.certificate import read_settings
-from tubecert.recheck.document import Members, Node, digest
+from tubecert.recheck.document import Members, Node, digest, nullable
 from tubecert.recheck.plans import Plan, read_knots
 from tubecert.recheck.specification import SampledSpecification, read_sampled_specification
 from tubecert.recheck.specified.numbers import Numbers, Range
@@ -102,7 +102,7 @@ def read_certificate(document: Node) -> Certificate:
     repeated: Repeated = {
         "spec.effective_hash": (source["effective_hash"].text(), spec.hash),
         **{f"spec.settings.{path}": pair for path, pair in settings.items()},
-        "claim.horizon": (claim.known("horizon", Node.decimal), horizon),
+        "claim.horizon": (nullable(Node.decimal)(claim["horizon"]), horizon),
         "claim.afterwards": (claim["afterwards"].text(), spec.afterwards),
         "claim.hold": (claim["hold"].text(), spec.hardware.hold),
     }

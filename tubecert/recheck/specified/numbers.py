@@ -58,6 +58,11 @@ def ends(node: Node) -> Range:
     return low, high
 
 
+def ranges(node: Node) -> dict[str, Range]:
+    """Names of somebody else's, each with two ends."""
+    return {name: (low.exact(), high.exact()) for name, side in node.items() for low, high in [side.pair()]}
+
+
 def span(node: Node) -> Range:
     """Ends that may be one point."""
     low, high = (end.exact() for end in node.pair())
