@@ -186,8 +186,8 @@ def codes() -> str:
     """The page of finding codes."""
     parts = [_NOTE, "# Finding codes", "The same pages as `tubecert explain CODE`. Codes are stable."]
     for page in pages.codes().values():
-        parts += [f"## {page.code}: {page.title}", page.meaning]
-        parts += [f"Wrong:\n\n```text\n{page.wrong}\n```", f"Right:\n\n```text\n{page.right}\n```"]
+        parts += [f"## {page.name}: {page.title}", page.meaning]
+        parts += [f"{name}:\n\n```text\n{text}\n```" for name, text in page.examples]
     return "\n\n".join(parts) + "\n"
 
 

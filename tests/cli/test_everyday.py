@@ -124,10 +124,11 @@ def test_every_page_has_meaning_formula_and_source(topic):
     assert len(parts) >= 2
     assert parts[-1].startswith("Source: ")
     assert max(map(len, page.text().splitlines())) <= 130
-    if isinstance(page, pages.CodePage):
-        assert page.wrong != page.right
+    if page.kind == "code":
+        wrong, right = dict(page.examples)["Wrong"], dict(page.examples)["Right"]
+        assert wrong != right
         assert "\\" not in page.text()  # an escape of TOML that no quotes resolved
-        assert f"Right:\n    {page.right.splitlines()[0]}" in run("explain", topic).stdout
+        assert f"Right:\n    {right.splitlines()[0]}" in run("explain", topic).stdout
 
 
 @pytest.mark.parametrize(
@@ -178,10 +179,9 @@ tube: {epsilon: 0.1, rho_a: 0.1}
     ],
 )
 def test_examples_are_wrong_and_right_as_they_say(code, old):
-    page = pages.codes()[code]
-    for text, said in ((page.wrong, True), (page.right, False)):
+    for name, text in pages.codes()[code].examples:
         Path("example.yaml").write_text(EXAMPLE.replace(old, text))
-        assert (code in run("check", "example.yaml", "--json").stdout) is said
+        assert (code in run("check", "example.yaml", "--json").stdout) is (name == "Wrong")
 
 
 def commands() -> list[str]:

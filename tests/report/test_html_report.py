@@ -156,7 +156,6 @@ def test_the_page_does_not_depend_on_the_process(tmp_path, orbit):
     assert outputs == {html.render_page(page_of(told(orbit))).encode()}
 
 
-FORMULA = {"math", "mrow", "mi", "mn", "mo", "mtext", "msub", "msup", "mover", "mfrac", "msqrt"}
 HOSTILE = st.text(
     st.sampled_from("<>&\"'`|*_\\{}%#[]()-;=/ \n\taé\u202e") | st.characters(exclude_categories=["Cs"]),
     max_size=12,
@@ -190,8 +189,7 @@ def test_no_text_becomes_markup(text):
     text = "".join(c for c in text if c.isprintable() or c in "\n\t")
     benign, hostile = parsed(_planted("plain")), parsed(_planted(text))
     assert hostile.tags.count("script") == 0
-    differing = set(hostile.tags) ^ set(benign.tags)
-    assert differing <= FORMULA, "what is an equation is typeset as one, whatever it says"
+    assert set(hostile.tags) == set(benign.tags)
     assert [n for n, _ in hostile.attributes if n.startswith("on")] == []
     shown = " ".join(f"x {text}".split())
     assert shown.replace("<=", "≤").replace(">=", "≥") in hostile.text
@@ -257,7 +255,6 @@ def test_declared_bounds_are_called_believed():
 def test_what_is_not_certified_has_no_numbers_to_rely_on_and_shows_its_witness(outside):
     page = page_of(told(outside))
     assert page.verdict == "refuted"
-    assert page.tiles == ()
     parsed_page = parsed(outside)
     at = outside["result"]["reasons"][0]["at"]
     assert f"x1 = {at['x'][0]:.6g}" in parsed_page.text

@@ -76,7 +76,6 @@ def test_what_is_lacking_is_told_with_what_helps_and_never_as_proven(lack):
     ]
     assert "\n  help  " in text
     assert "not proven" in text
-    assert not page_of(sampled.undecided(lack)).tiles
 
 
 @pytest.mark.parametrize(("name", "verbose", "told"), [

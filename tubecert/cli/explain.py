@@ -30,6 +30,6 @@ def _index() -> Iterator[str]:
     yield "\nFinding codes"
     yield from (f"  {code}  {page.title}" for code, page in pages.codes().items())
     yield "\nConstants (by name or symbol)"
-    yield from (f"  {name:<20} {page.symbol:<14} {page.words}" for name, page in pages.constants().items())
+    yield from (f"  {name:<20} {page.symbol:<14} {page.title}" for name, page in pages.constants().items())
     yield "\nEquations"
     yield from (f"  {tag:<20} {page.title}" for tag, page in pages.equations().items())

@@ -20,7 +20,6 @@ from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_time import input_figures, state_figures
 from tubecert.report.figures_tube import tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
-from tubecert.report.mathml import matrix, named
 from tubecert.report.outline import tube_outline, widths
 from tubecert.report.page import (
     Block,
@@ -32,7 +31,6 @@ from tubecert.report.page import (
     Page,
     Section,
     Table,
-    Tile,
     Words,
 )
 from tubecert.report.page_conditions import conditions
@@ -80,7 +78,6 @@ def page_of(certificate: Certificate, simulated: Simulated | None = None, *, all
         claim=_claim(result) if holds else "",
         meaning=_meaning(result),
         caveat=claimed.NOT_RECHECKED,
-        tiles=tuple(_tiles(result)),
         sections=tuple(islice(_sections(certificate, simulated), None if all_of_it else 1)),
     )
 
@@ -117,35 +114,6 @@ def _meaning(result: Result) -> str:
             return "That claim is proven false, so nothing that rests on it is certified."
         case _:
             return "This is neither proven nor refuted; it must not be relied on."
-
-
-def _tiles(result: Result) -> Iterator[Tile]:
-    """The numbers that a certified verdict is about; other verdicts have none to rely on."""
-    if result.verdict is not Verdict.CERTIFIED:
-        return
-    yield from _sizes(result)
-    chosen = deciding(result)
-    for row in chosen:
-        who = f", {NAMES[row.section]}" if len(chosen) > 1 else ""
-        if row.pair.bandwidth is not None:
-            yield Tile(symbol="ω", value=exact(row.pair.bandwidth), unit="rad/s", words=f"bandwidth{who}")
-        if row.pair.adaptation_rate is not None:
-            yield Tile(
-                symbol="Γ", value=exact(row.pair.adaptation_rate), unit="", words=f"adaptation rate{who}"
-            )
-
-
-_MOST_TILES = 4  # half-widths that are shown first
-
-
-def _sizes(result: Result) -> Iterator[Tile]:
-    """How wide the tube is: its radius, or half-widths where that is no length in the states, or is not proven."""
-    units, known = result.spec.effective.system.units, widths(result)
-    if reach.is_radius(result) or known is None:
-        yield Tile(symbol="ρ", value=up(claimed.radius(result)), unit="", words="radius of the tube")
-        return
-    for name, width in list(known.items())[:_MOST_TILES]:
-        yield Tile(symbol=name, value=up(width), unit=units.get(name, ""), words="half-width")
 
 
 def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator[Section]:
@@ -304,7 +272,7 @@ def _metric(metric: MetricData, tube: TubeData | None) -> Iterator[Block]:
     if metric.largest_rate is not None:
         facts.append(("supports rates up to", f"{down(metric.largest_rate.below, 7)} 1/s"))
     yield Facts.of([*facts, *_metric_bounds(metric, tube)])
-    yield Listing(text=_entries(metric), math=named("W", matrix(metric.dual_metric)))
+    yield Listing(text=_entries(metric))
     yield Words(text="W is the dual metric, the inverse of M; it is symmetric.")
 
 

@@ -104,11 +104,10 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Listing:
-    """Preformatted text: equations, commands; `math` is the same as MathML, to be shown in its place."""
+    """Preformatted text: equations, commands."""
 
     block: ClassVar[str] = "listing"
     text: str
-    math: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,16 +159,6 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tile:
-    """A number to be seen first."""
-
-    symbol: str
-    value: str
-    unit: str
-    words: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
     """The whole page: the verdict, what it means, the numbers it is about, and everything one may ask next.
 
@@ -182,7 +171,6 @@ class Page:
     summary: str
     sections: tuple[Section, ...]
     meaning: str = ""
-    tiles: tuple[Tile, ...] = ()
     about: str = "certificate"
     claim: str = ""
     caveat: str = ""

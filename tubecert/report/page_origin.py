@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from tubecert.certificate.effective import Effective, TableView
 from tubecert.digits import end, exact
 from tubecert.records import to_json
-from tubecert.report.mathml import Equation, aligned
-from tubecert.report.page import Block, Cell, Facts, Listing, Words
+from tubecert.report.page import Block, Facts, Listing, Words
 from tubecert.words.sampled_loop import family
 
 if TYPE_CHECKING:
@@ -22,31 +21,23 @@ _POINTS = 8  # of a table
 
 def system(effective: Effective, overrides: Mapping[str, object]) -> Iterator[Block]:
     """The effective specification in equations and words."""
-    found = tuple(dynamics(effective))
-    yield Listing(text="\n".join(each.text for each in found), math=aligned(found))
-    yield Facts(facts=tuple(_facts(effective, overrides)))
+    yield Listing(text="\n".join(equations(effective)))
+    yield Facts.of(_facts(effective, overrides))
 
 
 def equations(effective: Effective) -> Iterator[str]:
     """The dynamics, one line per state, then h."""
-    yield from (each.text for each in dynamics(effective))
-
-
-def dynamics(effective: Effective) -> Iterator[Equation]:
-    """The dynamics, one equation per state, then h."""
     model, wind = effective.system, effective.disturbance.E
     taken = {*model.states, *model.inputs}
     hs = _named(("h", "uncertainty"), model.inputs, taken)
     told = [f"({u} + {h})" for u, h in zip(model.inputs, hs, strict=True)]
     for i, (state, f, row) in enumerate(zip(model.states, model.f, model.B, strict=False)):
-        terms = [_times(b, u) for b, u in zip(row, told, strict=True) if b != "0"]
         blows = wind[i] if wind else ()
-        terms += [
-            _times(e, w) for e, w in zip(blows, _named(("w", "wind"), blows, taken), strict=True) if e != "0"
-        ]
-        yield Equation(left=state, right=(f, *terms), rate=True)
+        acting = [*zip(row, told, strict=True), *zip(blows, _named(("w", "wind"), blows, taken), strict=True)]
+        terms = (_times(factor, other) for factor, other in acting if factor != "0")
+        yield f"{state}' = {' + '.join((f, *terms))}"
     for name, h in zip(hs, effective.uncertainty.h, strict=False):  # none where only bounds are declared
-        yield Equation(left=name, right=(h,))
+        yield f"{name} = {h}"
 
 
 def _named(words: Sequence[str], items: Sequence[str], taken: Collection[str]) -> list[str]:
@@ -60,28 +51,28 @@ def _times(factor: str, other: str) -> str:
     return other if factor == "1" else f"({factor})*{other}"
 
 
-def _facts(effective: Effective, overrides: Mapping[str, object]) -> Iterator[tuple[str, Cell]]:
+def _facts(effective: Effective, overrides: Mapping[str, object]) -> Iterator[tuple[str, str]]:
     model = effective.system
     if model.parameters:
-        yield "parameters", Cell(text=_list(model.parameters))
+        yield "parameters", _list(model.parameters)
     for name, table in sorted(model.tables.items()):
-        yield f"table {name}", Cell(text=_points(table))
+        yield f"table {name}", _points(table)
     if model.units:
-        yield "units", Cell(text=", ".join(f"{name}: {unit}" for name, unit in sorted(model.units.items())))
+        yield "units", ", ".join(f"{name}: {unit}" for name, unit in sorted(model.units.items()))
     safe = effective.part("safe_set")
     sides = [(name, map(end, map(Fraction, safe[name]))) for name in model.states if name in safe]
-    yield "safe set", Cell(text=", ".join(f"{name} in [{', '.join(ends)}]" for name, ends in sides))
+    yield "safe set", ", ".join(f"{name} in [{', '.join(ends)}]" for name, ends in sides)
     if bounds := effective.uncertainty.bounds:
-        yield "bounds declared", Cell(text=_list(bounds))
+        yield "bounds declared", _list(bounds)
     told, any_of = effective.part("trajectory"), effective.trajectory.kind == "any"
-    yield "plan", Cell(text=f"any with {family(effective)}" if any_of else _plan(told))
+    yield "plan", f"any with {family(effective)}" if any_of else _plan(told)
     for name in ("initial_state", "adaptation", "hardware"):
         if part := effective.part(name):
-            yield name.replace("_", " "), Cell(text=_list(part))
+            yield name.replace("_", " "), _list(part)
     for obstacle in effective.parts("obstacles"):
-        yield "obstacle", Cell(text=_list(obstacle))
+        yield "obstacle", _list(obstacle)
     if overrides:
-        yield "overridden by the command", Cell(text=_list(overrides))
+        yield "overridden by the command", _list(overrides)
 
 
 def _points(table: TableView) -> str:
@@ -116,21 +107,20 @@ def provenance(certificate: Certificate) -> Iterator[Block]:
     """Hashes, versions, the command."""
     result, run = certificate.result, certificate.run
     facts = [
-        ("certificate", Cell(text=certificate.hash, kind="code")),
-        ("specification, as read", Cell(text=result.spec.effective_hash, kind="code")),
-        ("specification, the file", Cell(text=result.spec.file_hash, kind="code")),
-        ("format", Cell(text=certificate.format)),
+        ("certificate", certificate.hash),
+        ("specification, as read", result.spec.effective_hash),
+        ("specification, the file", result.spec.file_hash),
+        ("format", certificate.format),
     ]
     if result.effort is not None:
-        facts.append(("effort", Cell(text=_list(to_json(result.effort)))))
+        facts.append(("effort", _list(to_json(result.effort))))
     if run.command:
-        facts.append(("command", Cell(text=run.command, kind="code")))
+        facts.append(("command", run.command))
     if run.versions:
-        facts.append(("versions", Cell(text=", ".join(f"{k} {v}" for k, v in sorted(run.versions.items())))))
+        facts.append(("versions", ", ".join(f"{k} {v}" for k, v in sorted(run.versions.items()))))
     if run.started:
-        seconds = "?" if run.seconds is None else run.seconds
-        facts.append(("made", Cell(text=f"{run.started}, in {seconds} s")))
-    yield Facts(facts=tuple(facts))
+        facts.append(("made", f"{run.started}, in {'?' if run.seconds is None else run.seconds} s"))
+    yield Facts.of(facts)
 
 
 def check_again(name: str, notes: str, *more: str) -> Iterator[Block]:

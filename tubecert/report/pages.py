@@ -18,86 +18,30 @@ _WIDTH = 96
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CodePage:
-    """A finding code: what it means, and an example with its remedy."""
+class Page:
+    """What is explained: a word, a code, an equation or a constant. `kind` says which; `also`: other spellings.
 
-    code: str
+    `shown` is what stands before the meaning, as it is (a formula); `examples` and `after` follow it.
+    """
+
+    kind: str
+    name: str
     title: str
-    meaning: str
-    wrong: str = ""
-    right: str = ""
-    command: str = "check"
-
-    def text(self) -> str:
-        """The page."""
-        parts = [f"{self.code}: {self.title}", _filled(self.meaning)]
-        parts += [
-            f"{name}:\n{_indented(text)}"
-            for name, text in (("Wrong", self.wrong), ("Right", self.right))
-            if text
-        ]
-        return "\n\n".join([*parts, f"Source: {self.command}, finding code {self.code}"])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EquationPage:
-    """An equation: what it says, its formula, and where it is proven."""
-
-    tag: str
-    title: str
-    formula: str
     meaning: str
     source: str
-
-    def text(self) -> str:
-        """The page."""
-        parts = [f"{self.tag}: {self.title}", _indented(self.formula), _filled(self.meaning)]
-        return "\n\n".join([*parts, f"Source: {self.source}"])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConstantPage:
-    """A constant of the certificates."""
-
-    name: str
-    symbol: str
-    words: str
-    unit: str
-    equation: str
-    formula: str
-    meaning: str
-
-    def text(self) -> str:
-        """The page."""
-        parts = [
-            f"{self.name} ({self.symbol}): {self.words}",
-            _indented(self.formula),
-            _filled(self.meaning),
-            f"Unit: {self.unit} (x: state, u: input, d: Riemannian distance)",
-            f"In a certificate: result.constants.{self.name}, as [proven below, proven above]",
-            f"Source: {self.equation}; docs/theory, docs/equations.md",
-        ]
-        return "\n\n".join(parts)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WordPage:
-    """A word of the reports: what it means, its unit if it is a number, other spellings, where to read on."""
-
-    word: str
-    title: str
-    meaning: str
-    see: str
-    unit: str = ""
+    symbol: str = ""
+    shown: str = ""
+    examples: tuple[tuple[str, str], ...] = ()
+    after: tuple[str, ...] = ()
     also: tuple[str, ...] = ()
 
     def text(self) -> str:
         """The page."""
-        parts = [f"{self.word}: {self.title}", _filled(self.meaning)]
-        return "\n\n".join([*parts, *([f"Unit: {self.unit}"] if self.unit else []), f"Source: {self.see}"])
-
-
-Page = CodePage | EquationPage | ConstantPage | WordPage
+        head = f"{self.name} ({self.symbol}): " if self.symbol else f"{self.name}: "
+        shown = [_indented(self.shown)] if self.shown else []
+        examples = (f"{name}:\n{_indented(text)}" for name, text in self.examples)
+        parts = [f"{head}{self.title}", *shown, _filled(self.meaning), *examples, *self.after]
+        return "\n\n".join([*parts, f"Source: {self.source}"])
 
 
 def _data(name: str) -> Mapping[str, Any]:
@@ -105,46 +49,71 @@ def _data(name: str) -> Mapping[str, Any]:
 
 
 @cache
-def codes() -> Mapping[str, CodePage]:
-    """The pages of the finding codes."""
-    return {code: CodePage(code=code, **page) for code, page in _data("codes").items()}
+def codes() -> Mapping[str, Page]:
+    """The pages of the finding codes, with what is wrong and right in an example."""
+    return {code: _of_code(code, **page) for code, page in _data("codes").items()}
+
+
+def _of_code(
+    code: str, *, title: str, meaning: str, wrong: str = "", right: str = "", command: str = "check"
+) -> Page:
+    return Page(
+        kind="code",
+        name=code,
+        title=title,
+        meaning=meaning,
+        examples=tuple(each for each in (("Wrong", wrong), ("Right", right)) if each[1]),
+        source=f"{command}, finding code {code}",
+    )
 
 
 @cache
-def equations() -> Mapping[str, EquationPage]:
+def equations() -> Mapping[str, Page]:
     """The pages of the equations, by their tags."""
-    return {tag: EquationPage(tag=tag, **page) for tag, page in _data("equations").items()}
+    pages = _data("equations").items()
+    return {tag: Page(kind="equation", name=tag, shown=page.pop("formula"), **page) for tag, page in pages}
 
 
 @cache
-def constants() -> Mapping[str, ConstantPage]:
+def constants() -> Mapping[str, Page]:
     """The pages of the constants, by their names in a certificate."""
     from tubecert.bounds.constants import EVERY
 
     data = _data("constants")
     return {
-        name: ConstantPage(
+        name: Page(
+            kind="constant",
             name=name,
-            symbol=meaning.symbol,
-            words=meaning.words,
-            unit=meaning.unit,
-            equation=meaning.equation,
-            **data[name],
+            symbol=own.symbol,
+            title=own.words,
+            shown=data[name]["formula"],
+            meaning=data[name]["meaning"],
+            after=(
+                f"Unit: {own.unit} (x: state, u: input, d: Riemannian distance)",
+                f"In a certificate: result.constants.{name}, as [proven below, proven above]",
+            ),
+            source=f"{own.equation}; docs/theory.md, docs/equations.md",
         )
-        for name, meaning in EVERY.items()
+        for name, own in EVERY.items()
     }
 
 
 @cache
-def words() -> Mapping[str, WordPage]:
+def words() -> Mapping[str, Page]:
     """The pages of the words of reports."""
-    return {
-        word: WordPage(word=word, also=tuple(page.pop("also", ())), **page)
-        for word, page in _data("words").items()
-    }
+    return {word: _of_word(word, **page) for word, page in _data("words").items()}
 
 
-def _spelled() -> Mapping[str, WordPage]:
+def _of_word(
+    word: str, *, title: str, meaning: str, see: str, unit: str = "", also: tuple[str, ...] = ()
+) -> Page:
+    after = (f"Unit: {unit}",) if unit else ()
+    return Page(
+        kind="word", name=word, title=title, meaning=meaning, source=see, after=after, also=tuple(also)
+    )
+
+
+def _spelled() -> Mapping[str, Page]:
     return {also: page for page in words().values() for also in page.also}
 
 

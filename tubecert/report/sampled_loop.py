@@ -14,7 +14,7 @@ from tubecert.certificate.effective import Effective
 from tubecert.digits import near, up
 from tubecert.report.claimed import NOT_RECHECKED, ends, size, started
 from tubecert.report.figures_sampled import figures, period
-from tubecert.report.page import Block, Cell, Facts, Figures, Items, Listing, Page, Section, Table, Tile
+from tubecert.report.page import Block, Cell, Facts, Figures, Items, Listing, Page, Section, Table
 from tubecert.report.page_origin import check_again, system
 from tubecert.report.page_simulation import Simulated, simulated_blocks
 from tubecert.sampled_loop.record import Certificate, Notes, Result
@@ -32,7 +32,6 @@ from tubecert.words.sampled_loop import (
 )
 
 _MOST, _ROWS = 6, 4  # states of the first screen; where there are more than four, they stand side by side
-_TILES: Final = 4
 _NOTES: Final = "What fills the tube and the points to draw the plan by"
 _LAW: Final = (
     "y_k = x(t_k) + noise,   t_k = k times the sample time",
@@ -52,12 +51,6 @@ def page_of(certificate: Certificate, simulated: Simulated | None = None, *, all
         summary=promise(result),
         meaning=_meaning(result),
         caveat=NOT_RECHECKED,
-        tiles=tuple(
-            Tile(
-                symbol=name, value=f"±{size(width)}", unit=own.system.units.get(name, ""), words="half-width"
-            )
-            for name, width in [*result.half_widths.items()][:_TILES]
-        ),
         sections=tuple(islice((each for each in found if each.blocks), None if all_of_it else 1)),
     )
 
