@@ -1,6 +1,7 @@
 """Pages from certificates: what they say, that no text can break them, and how a browser shows them."""
 
 import copy
+import io
 import json
 import math
 import os
@@ -11,6 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import certificates
+import numpy as np
 import pages
 import pytest
 import sympy
@@ -28,11 +30,13 @@ from tubecert.cli.app import app
 from tubecert.conditions.rates import RateRecipe
 from tubecert.digits import percent, up
 from tubecert.expression import to_text
+from tubecert.library.pages import Report
 from tubecert.pipeline import Options
 from tubecert.records import from_json
 from tubecert.report import html, markdown
 from tubecert.report.certificate_page import page_of
 from tubecert.report.figures_axes import Axis, _hexagon, number
+from tubecert.report.figures_file import painted
 from tubecert.spec import load, load_text
 
 ROOT = Path(__file__).parents[2]
@@ -319,7 +323,7 @@ def units(drawing, page_certificate, names):
 
 def test_the_tube_of_a_constant_metric_is_an_ellipse_as_wide_as_its_half_widths(orbit):
     drawing = drawn(orbit, "tube-0-1")
-    (plan,) = (x for x in drawing.iter("path") if "plan" in x.get("class", ""))
+    plan = plan_of(drawing)
     (safe,) = (x for x in drawing.iter("rect") if x.get("class") == "safe")
     low = orbit["result"]["safe_set"]["x1"][0]
     unit = units(drawing, orbit, ("x1", "x2"))
@@ -524,6 +528,35 @@ def test_a_page_goes_well_with_the_certificate_on_stdout(folder, proven):
     done = CliRunner().invoke(app, ["certify", "plant.yaml", "-o", "-", "--report", "a.htm"])
     assert json.loads(done.stdout)["result"]["verdict"] == "certified"
     assert Path("a.htm").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+
+
+@pytest.mark.slow
+def test_figures_are_files_for_a_paper(orbit, tmp_path):
+    """The tube is as wide in the PNG as in the drawing, in its colour; a PDF has fonts, and the caption says all."""
+    figure = figures(orbit)["tube-0-1"]
+    import matplotlib.pyplot as plt
+
+    image = plt.imread(io.BytesIO(painted("png", figure)))[..., :3]
+    unit = image.shape[1] / 400
+    image = image[: round(unit * (26 + float(pages.ET.fromstring(figure.svg).get("viewBox").split()[3])))]
+    colored = np.abs(image - np.array([0xA8, 0xCA, 0xEC]) / 255).max(axis=2) < 0.02
+    drawing = pages.ET.fromstring(figure.svg)
+    wide = max(x for x, _ in points(plan_of(drawing))) - min(x for x, _ in points(plan_of(drawing)))
+    found = np.flatnonzero(colored.any(axis=0))
+    assert (found[-1] - found[0]) / unit == pytest.approx(wide + 2 * swept(drawing)[0], abs=3)
+    data = painted("pdf", figure)
+    assert data.startswith(b"%PDF")
+    assert data == painted("pdf", figure)
+    assert b"/FontFile2" in data, "texts are texts"
+    assert figure.told.startswith("Tube in the plane of x1 and x2: safe set, tube, plan, obstacle")
+    names = Report(certificate=told(orbit)).save_figures(tmp_path)
+    assert {"tube-0-1.svg", "tube-0-1.pdf", "tube-0-1.png", "captions.md"} <= {*names}
+    assert {path.name for path in tmp_path.iterdir()} == {*names}
+
+
+def plan_of(drawing):
+    (plan,) = (x for x in drawing.iter("path") if "plan" in x.get("class", ""))
+    return plan
 
 
 @pytest.mark.parametrize(

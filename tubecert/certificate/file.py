@@ -165,7 +165,12 @@ def write(target: str, certificate: Mapping[str, Any]) -> None:
 
 
 def write_text(target: str, text: str, remedy: str = REMEDY) -> None:
-    """Write a text to a temporary file and rename it; devices are written to directly.
+    """Write a text as `write_bytes` does."""
+    write_bytes(target, text.encode(), remedy)
+
+
+def write_bytes(target: str, data: bytes, remedy: str = REMEDY) -> None:
+    """Write to a temporary file and rename it; devices are written to directly.
 
     Raises `TargetError`; then nothing is left behind and an older file is untouched.
     """
@@ -173,10 +178,10 @@ def write_text(target: str, text: str, remedy: str = REMEDY) -> None:
     path = Path(target)
     try:
         if path.exists() and not path.is_file():
-            with path.open("w", encoding="utf-8") as device:
-                device.write(text)
+            with path.open("wb") as device:
+                device.write(data)
         else:
-            replace(path, text.encode())
+            replace(path, data)
     except OSError as error:
         raise _unwritable(target, error.strerror or str(error), remedy) from error
 

@@ -82,9 +82,10 @@ def run(given: Given, output: Output) -> ExitCode:
     if found.file is not None and target != certificate.STDOUT:
         certificate.write(target, found.file.to_json())
     if given.plot and found.rows:
-        from tubecert.report.figures_rates import draw
+        from tubecert.report.figures_file import svg_file
+        from tubecert.report.figures_rates import rate_figures
 
-        certificate.write_text(given.plot, draw(found.search().table))
+        certificate.write_text(given.plot, svg_file(*rate_figures(found.search().table)))
     _report(found, system, target, output)
     if found.cut is not None and found.file is None:
         keeper.tell({"said": False})  # where it was is worth a word

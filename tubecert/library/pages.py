@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 from dataclasses import dataclass, field
@@ -9,7 +10,7 @@ from html import escape
 from typing import TYPE_CHECKING, Final
 
 from tubecert import files
-from tubecert.certificate.file import write_text
+from tubecert.certificate.file import write_bytes, write_text
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.reading import read
@@ -57,6 +58,24 @@ class Report:
         require_page(target)
         text = self.markdown if _suffix(target) in MARKDOWN else self.html
         write_text(target, text, REMEDY)
+
+    def save_figures(self, folder: File) -> list[str]:
+        """Write every figure into a folder, as SVG, PDF and PNG, and what they show as captions.md; their names.
+
+        PDF and PNG need matplotlib (the extra `simulate`). Raises `TargetError`.
+        """
+        from tubecert.report.figures_file import painted, svg_file
+
+        told = page_of(self.certificate, self.simulated).figures
+        data = {f"{each.key}.svg": svg_file(each).encode() for each in told}
+        if importlib.util.find_spec("matplotlib") is not None:
+            data |= {
+                f"{each.key}.{ending}": painted(ending, each) for each in told for ending in ("pdf", "png")
+            }
+        data["captions.md"] = "".join(f"- {each.key}: {each.told}\n" for each in told).encode()
+        for name, content in data.items():
+            write_bytes(os.path.join(os.fspath(folder), name), content, REMEDY)
+        return list(data)
 
     def __repr__(self) -> str:
         return f"<Report: a page about {self.certificate.result.spec.effective.name}>"

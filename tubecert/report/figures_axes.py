@@ -103,11 +103,12 @@ class Chart:
         """A filled polygon."""
         ET.SubElement(self.plot, "path", {"class": style, "d": path(map(self.at, points)) + "Z"})
 
-    def box(self, low: Point, high: Point, style: str) -> None:
+    def box(self, low: Point, high: Point, style: str) -> ET.Element:
         """A rectangle with sides along the axes."""
         (left, bottom), (right, top) = self.at(low), self.at(high)
         size = {"x": left, "y": top, "width": right - left, "height": bottom - top}
-        ET.SubElement(self.plot, "rect", {"class": style, **{k: number(v) for k, v in size.items()}})
+        look = {"class": style} if style else {}
+        return ET.SubElement(self.plot, "rect", {**look, **{k: number(v) for k, v in size.items()}})
 
     def ellipse(self, center: Point, radii: Point, style: str) -> None:
         """An ellipse with half axes along the axes of the chart."""

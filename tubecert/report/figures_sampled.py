@@ -140,7 +140,8 @@ def _planes(result: Result, x: Array, widths: Array) -> Iterator[Figure]:
             if set(obstacle.states) == set(names):
                 draw_obstacle(chart, obstacle, names)
         legend.append(("obstacle", "obstacle"))
-        yield Figure(key=chart.key, title=", ".join(names), svg=chart.text(), legend=tuple(legend))
+        title = f"Tube in the plane of {' and '.join(names)}"
+        yield Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(legend))
 
 
 def _bars(filled: Mapping[str, Shares]) -> Figure:
@@ -157,7 +158,9 @@ def _bars(filled: Mapping[str, Shares]) -> Figure:
             ET.SubElement(bar, "title").text = f"{what} {part} %"
             used[what], x = None, end
     legend = tuple((_STYLES[what], what) for what in SHARES.values() if what in used)
-    return Figure(key="shares", title=title, svg=ET.tostring(svg, encoding="unicode"), legend=legend)
+    caption = "Each bar is the whole of a half-width in the long run, or of what is added to an input."
+    drawn = ET.tostring(svg, encoding="unicode")
+    return Figure(key="shares", title=title, svg=drawn, legend=legend, caption=caption)
 
 
 def _points(x: Array, y: Array) -> list[Point]:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import groupby, pairwise
+from dataclasses import replace
+from itertools import groupby, pairwise, product
 from math import log, sqrt
+from typing import Final
 
 from tubecert.digits import short
 from tubecert.report.figures_axes import LEFT, RIGHT, WIDTH, Axis, Chart, Point, number, text
@@ -20,10 +21,11 @@ from tubecert.report.sweep import ERROR, Row, SweepTable
 from tubecert.sweep import grid
 from tubecert.verdict import Verdict
 
-_COLORS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))  # viridis
-_PARTS = ("epsilon", "rho_a", "rho_r")  # of rho, which is drawn
-_STRIP = 40  # height of the scale of colours below a heat map
-_LEGEND = {
+_COLORS: Final = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))  # viridis
+_PARTS: Final = ("epsilon", "rho_a", "rho_r")  # of rho, which is drawn
+_STRIP, _STEPS = 40, 40  # height of the scale of colours below a heat map, and its colours
+_WIDE: Final = 20  # times the least: such values are drawn by their logarithms
+_LEGEND: Final = {
     **{str(verdict): str(verdict) for verdict in Verdict},
     ERROR: "invalid",
     "none": "nothing proven",
@@ -31,12 +33,12 @@ _LEGEND = {
 
 
 def sweep_figures(table: SweepTable) -> list[Figure]:
-    """Every figure that there is: over one or two keys with numbers in order, beside one of words at most for one."""
-    axes = [axis for axis in table.axes if _ordered(axis.numbers or ())]
-    words = [axis for axis in table.axes if axis not in axes]
-    if len(axes) == 1 and len(words) <= 1:
-        return list(_curves(table, axes[0], words))
-    return list(_maps(table, axes[0], axes[1])) if len(axes) == 2 and not words else []
+    """Every figure that there is: over one or two keys whose values are numbers in order."""
+    if not all(_ordered(axis.numbers or ()) for axis in table.axes):
+        return []
+    if len(table.axes) == 1:
+        return list(_curves(table, table.axes[0]))
+    return list(_maps(table)) if len(table.axes) == 2 else []
 
 
 def with_figures(page: Page, drawn: Sequence[Figure]) -> Page:
@@ -79,194 +81,107 @@ def _value(row: Row, quantity: Quantity) -> float | None:
 # -- one key
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Curve:
-    """The values of a quantity at the places of a key, None where nothing is drawn; `words`: what it is called."""
-
-    quantity: Quantity
-    values: tuple[float | None, ...]
-    words: str
-
-
-def _curves(table: SweepTable, axis: grid.Axis, words: Sequence[grid.Axis]) -> Iterator[Figure]:
-    """A chart for each quantity, with a curve for each kind, and for each word where they differ."""
-    shown = sorted(_shown(table), key=lambda each: _group(each) != "rho")
+def _curves(table: SweepTable, axis: grid.Axis) -> Iterator[Figure]:
+    """A chart for each quantity, the same gain of all kinds and all half-widths in one; rho comes first."""
     groups: dict[str, list[Quantity]] = {}
-    for each in shown:
-        groups.setdefault(_group(each), []).append(each)
+    for each in sorted(_shown(table), key=lambda each: each.name != "rho"):
+        name = each.name if each.section else each.name.partition(".")[0]
+        groups.setdefault(name, []).append(each)
     for name, members in groups.items():
-        yield _curve(table, axis, name, members, words)
+        yield _curve(table, axis, name, members)
 
 
-def _group(quantity: Quantity) -> str:
-    """What is drawn in one chart: the same gain of all kinds, all half-widths."""
-    return quantity.name.partition(".")[0] if not quantity.section else quantity.name
-
-
-def _parts(table: SweepTable, words: Sequence[grid.Axis]) -> list[tuple[str, list[Row]]]:
-    """The rows of every word, in the order of the other key."""
-    if not words:
-        return [("", list(table.rows))]
-    (axis,) = words
-    return [(text, [row for row in table.rows if _text_of(row, axis) == text]) for text in axis.texts]
-
-
-def _text_of(row: Row, axis: grid.Axis) -> str:
-    return next(each.text for each in row.point.settings if each.path == axis.path)
-
-
-def _drawn(parts: Sequence[tuple[str, list[Row]]], members: Sequence[Quantity], label: str) -> list[_Curve]:
-    """The curves of a chart: of a word whose values are those of another one, none."""
-    found: list[_Curve] = []
-    for each in members:
-        own: dict[tuple[float | None, ...], _Curve] = {}
-        for word, rows in parts:
-            values = tuple(_value(row, each) for row in rows)
-            if values not in own and any(value is not None for value in values):
-                name = _told_apart(each, label)
-                own[values] = _Curve(quantity=each, values=values, words=f"{name}, {word}")
-        if len(own) == 1:
-            own = {key: replace(one, words=_told_apart(each, label)) for key, one in own.items()}
-        found += own.values()
-    return found
-
-
-def _curve(
-    table: SweepTable,
-    axis: grid.Axis,
-    name: str,
-    members: Sequence[Quantity],
-    words: Sequence[grid.Axis],
-) -> Figure:
-    places, parts = axis.numbers or (), _parts(table, words)
+def _curve(table: SweepTable, axis: grid.Axis, name: str, members: Sequence[Quantity]) -> Figure:
+    places = axis.numbers or ()
     label = members[0].words.rpartition(", ")[2] if members[0].section else name.replace("_", " ")
-    curves = _drawn(parts, members, label)
-    values = [v for each in curves for v in each.values if v is not None]
-    spread = min(values) > 0 and max(values) > 20 * min(values)
+    values = [v for each in members for row in table.rows if (v := _value(row, each)) is not None]
     x = Axis.around(places, axis.path, log=axis.log, pad=0.03)
     title = f"{label} against {axis.path}"
-    chart = Chart(f"sweep-{name}", title, x, Axis.around(values, label, log=spread))
-    legend = [] if words else [(f"cell {verdict}", text) for verdict, text in _uncertified(table)]
-    for (low, high), row in zip(pairwise(_edges(places, log_=axis.log)), parts[0][1], strict=True):
-        if row.verdict != Verdict.CERTIFIED and not words:
-            ends = max(min(low, high), x.low), min(max(low, high), x.high)
-            chart.box((ends[0], chart.y.low), (ends[1], chart.y.high), f"cell {row.verdict}")
-    for index, each in enumerate(curves):
-        style = STYLES.get(each.quantity.section, "") if each.quantity.section else f"m{index % 3 + 1}"
-        for known, part in groupby(
-            zip(places, each.values, strict=True), key=lambda point: point[1] is not None
-        ):
-            if known:
-                _line(chart, [(x, y) for x, y in part if y is not None], style)
-        legend.append((style, each.words))
-    caption = "Every dot is a certificate" + ("." if words else "; shaded: the verdict is not certified.")
-    return Figure(key=f"sweep-{name}", title=title, svg=chart.text(), legend=tuple(legend), caption=caption)
+    chart = Chart(f"sweep-{name}", title, x, Axis.around(values, label, log=_is_wide(values)))
+    legend = [
+        (f"cell {key}", words) for key, words in _LEGEND.items() if key != "certified" and table.count(key)
+    ]
+    for (one, other), row in zip(pairwise(_edges(axis)), table.rows, strict=True):
+        if row.verdict != Verdict.CERTIFIED:
+            low, high = max(min(one, other), x.low), min(max(one, other), x.high)
+            chart.box((low, chart.y.low), (high, chart.y.high), f"cell {row.verdict}")
+    for index, each in enumerate(members):
+        style = STYLES.get(each.section, "") if each.section else f"m{index % 3 + 1}"
+        _line(chart, [(at, _value(row, each)) for at, row in zip(places, table.rows, strict=True)], style)
+        legend.append((style, each.words.removesuffix(f", {label}") if each.section else each.words))
+    caption = "Every dot is a certificate; shaded: the verdict is not certified."
+    return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(legend), caption=caption)
 
 
-def _told_apart(quantity: Quantity, label: str) -> str:
-    """What a curve is called beside others of the same quantity."""
-    return quantity.words.removesuffix(f", {label}") if quantity.section else quantity.words
-
-
-def _line(chart: Chart, points: Sequence[Point], style: str) -> None:
-    if len(points) > 1:
-        chart.line(points, style)
-    for point in points:
-        chart.dot(point, style, 3.0, f"{short(point[0])}: {short(point[1])}")
-
-
-def _uncertified(table: SweepTable) -> list[tuple[str, str]]:
-    return [(key, words) for key, words in _LEGEND.items() if key != Verdict.CERTIFIED and table.count(key)]
+def _line(chart: Chart, points: Sequence[tuple[float, float | None]], style: str) -> None:
+    """A curve, interrupted where there is no value."""
+    for known, part in groupby(points, key=lambda point: point[1] is not None):
+        drawn = [(x, y) for x, y in part if y is not None]
+        if known and len(drawn) > 1:
+            chart.line(drawn, style)
+        for point in drawn:
+            chart.dot(point, style, 3.0, f"{short(point[0])}: {short(point[1])}")
 
 
 # -- two keys
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Plane:
-    """The cells of a heat map: the keys, and the edges between their values."""
-
-    table: SweepTable
-    down: grid.Axis
-    across: grid.Axis
-
-    def cells(self) -> Iterator[tuple[Row, Point, Point]]:
-        """Every row with the corners of its cell; the second key goes across."""
-        rows = iter(self.table.rows)
-        for bottom, top in pairwise(_edges(self.down.numbers or (), log_=self.down.log)):
-            for left, right in pairwise(_edges(self.across.numbers or (), log_=self.across.log)):
-                low, high = (min(left, right), min(bottom, top)), (max(left, right), max(bottom, top))
-                yield next(rows), low, high
-
-    def chart(self, key: str, title: str) -> Chart:
-        """The axes, without room beside the cells."""
-        x, y = (
-            Axis.around(_edges(axis.numbers or (), log_=axis.log), axis.path, log=axis.log, pad=0.0)
-            for axis in (self.across, self.down)
-        )
-        return Chart(key, title, x, y)
+def _cells(table: SweepTable) -> Iterator[tuple[Row, Point, Point]]:
+    """Every row with the corners of its cell; the second key goes across."""
+    down, across = (list(pairwise(_edges(axis))) for axis in table.axes)
+    for row, (rows, columns) in zip(table.rows, product(down, across), strict=True):
+        yield row, (min(columns), min(rows)), (max(columns), max(rows))
 
 
-def _maps(table: SweepTable, down: grid.Axis, across: grid.Axis) -> Iterator[Figure]:
-    plane = _Plane(table=table, down=down, across=across)
-    chart = plane.chart("sweep-verdict", "Verdict")
-    for row, low, high in plane.cells():
+def _plane(table: SweepTable, key: str, title: str) -> Chart:
+    """The axes of a heat map, without room beside the cells."""
+    y, x = (Axis.around(_edges(axis), axis.path, log=axis.log, pad=0.0) for axis in table.axes)
+    return Chart(key, title, x, y)
+
+
+def _maps(table: SweepTable) -> Iterator[Figure]:
+    chart = _plane(table, "sweep-verdict", "Verdict")
+    for row, low, high in _cells(table):
         chart.box(low, high, f"cell {row.verdict}")
     legend = tuple((f"cell {key}", words) for key, words in _LEGEND.items() if table.count(key))
     caption = "Each cell is one certification, at the values in its middle."
-    yield Figure(key="sweep-verdict", title="Verdict", svg=chart.text(), legend=legend, caption=caption)
+    yield Figure(key=chart.key, title="Verdict", svg=chart.text(), legend=legend, caption=caption)
     for each in _shown(table):
-        yield _map(plane, each)
+        yield _map(table, each)
 
 
-def _map(plane: _Plane, quantity: Quantity) -> Figure:
-    values = [v for row in plane.table.rows if (v := _value(row, quantity)) is not None]
-    low, high = min(values), max(values)
-    spread = low > 0 and high > 20 * low
-    key = f"sweep-{quantity.key.replace('.', '-')}"
-    chart = plane.chart(key, quantity.words)
+def _map(table: SweepTable, quantity: Quantity) -> Figure:
+    values = [v for row in table.rows if (v := _value(row, quantity)) is not None]
+    low, high, wide = min(values), max(values), _is_wide(values)
+    chart = _plane(table, f"sweep-{quantity.key.replace('.', '-')}", quantity.words)
     missing: dict[str, None] = {}
-    for row, lower, upper in plane.cells():
+    for row, lower, upper in _cells(table):
         value = _value(row, quantity)
         if value is None:
-            verdict = row.value(f"{quantity.section}.verdict") or row.verdict
-            style = str(verdict) if verdict != Verdict.CERTIFIED else "none"
+            verdict = str(row.value(f"{quantity.section}.verdict") or row.verdict)
+            style = verdict if verdict != Verdict.CERTIFIED else "none"
             missing[style] = None
             chart.box(lower, upper, f"cell {style}")
             continue
-        place = (
-            (log(value / low) / log(high / low) if spread else (value - low) / (high - low))
-            if high > low
-            else 0.5
-        )
-        _colored(chart, lower, upper, _color(place), f"{short(value)}")
-    svg = _with_scale(chart, short(low), short(high), "in equal factors" if spread else "")
-    legend = tuple((f"cell {style}", _LEGEND.get(style, style)) for style in missing)
-    return Figure(key=key, title=quantity.words, svg=svg, legend=legend, caption="")
+        share = log(value / low) / log(high / low) if wide else (value - low) / (high - low)
+        rect = chart.box(lower, upper, "")
+        rect.set("fill", _color(share))
+        ET.SubElement(rect, "title").text = short(value)
+    _scale(chart, short(low), short(high), "in equal factors" if wide else "")
+    legend = tuple((f"cell {style}", _LEGEND[style]) for style in missing)
+    return Figure(key=chart.key, title=quantity.words, svg=chart.text(), legend=legend)
 
 
-def _colored(chart: Chart, low: Point, high: Point, color: str, words: str) -> None:
-    (left, bottom), (right, top) = chart.at(low), chart.at(high)
-    size = {"x": left, "y": top, "width": right - left, "height": bottom - top}
-    rect = ET.SubElement(chart.plot, "rect", {"fill": color, **{key: number(v) for key, v in size.items()}})
-    ET.SubElement(rect, "title").text = words
-
-
-def _with_scale(chart: Chart, low: str, high: str, how: str) -> str:
-    """The drawing with its colours explained below."""
+def _scale(chart: Chart, low: str, high: str, how: str) -> None:
+    """Explains the colours below the drawing."""
     chart.svg.set("viewBox", f"0 0 {WIDTH} {chart.height + _STRIP}")
-    top, width, steps = chart.height + 4, WIDTH - LEFT - RIGHT, 40
-    for step in range(steps):
-        place = {"x": number(LEFT + width * step / steps), "y": str(top), "height": "12"}
-        ET.SubElement(
-            chart.svg,
-            "rect",
-            {**place, "width": number(width / steps + 0.5), "fill": _color(step / (steps - 1))},
-        )
-    text(chart.svg, (LEFT, top + 26), low, "tick")
-    text(chart.svg, (LEFT + width / 2, top + 26), how, "tick middle")
-    text(chart.svg, (LEFT + width, top + 26), high, "tick end")
-    return chart.text()
+    top, width = chart.height + 4, WIDTH - LEFT - RIGHT
+    for step in range(_STEPS):
+        place = {"x": number(LEFT + width * step / _STEPS), "y": str(top), "height": "12"}
+        look = {"width": number(width / _STEPS + 0.5), "fill": _color(step / (_STEPS - 1))}
+        ET.SubElement(chart.svg, "rect", {**place, **look})
+    for words, at, style in ((low, 0.0, "tick"), (how, 0.5, "tick middle"), (high, 1.0, "tick end")):
+        text(chart.svg, (LEFT + at * width, top + 26), words, style)
 
 
 def _color(place: float) -> str:
@@ -277,12 +192,17 @@ def _color(place: float) -> str:
     return "#" + "".join(f"{channel:02x}" for channel in mixed)
 
 
-def _edges(values: Sequence[float], *, log_: bool) -> list[float]:
-    """Where the cell of each value begins, and where the last one ends."""
-    if log_:
+def _is_wide(values: Sequence[float]) -> bool:
+    return min(values) > 0 and max(values) > _WIDE * min(values)
+
+
+def _edges(axis: grid.Axis) -> list[float]:
+    """Where the cell of each value of a key begins, and where the last one ends."""
+    values = list(axis.numbers or ())
+    if len(values) == 1:
+        return [values[0] - 0.5, values[0] + 0.5]
+    if axis.log:
         inner = [sqrt(a * b) for a, b in pairwise(values)]
         return [values[0] ** 2 / inner[0], *inner, values[-1] ** 2 / inner[-1]]
     inner = [(a + b) / 2 for a, b in pairwise(values)]
-    if not inner:
-        return [values[0] - 0.5, values[0] + 0.5]
     return [2 * values[0] - inner[0], *inner, 2 * values[-1] - inner[-1]]

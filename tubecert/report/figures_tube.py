@@ -51,7 +51,7 @@ def tube_figures(result: Result) -> list[Figure]:
 
 
 def _tube(result: Result, plane: Plane) -> Figure:
-    title = f"{plane.names[0]}, {plane.names[1]}"
+    title = f"Tube in the plane of {plane.names[0]} and {plane.names[1]}"
     witnesses = [
         (plane.of(at.x), f"{reason.claim.title}: {point(result, at)}")
         for reason in result.reasons

@@ -36,6 +36,12 @@ class Figure:
     legend: tuple[tuple[str, str], ...] = ()
     caption: str = ""
 
+    @property
+    def told(self) -> str:
+        """A caption that stands without the page: what is drawn, and what each mark is."""
+        shown = ", ".join(words for _, words in self.legend)
+        return f"{self.title}{': ' if shown else ''}{shown}. {self.caption}".rstrip()
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
@@ -174,6 +180,12 @@ class Page:
     about: str = "certificate"
     claim: str = ""
     caveat: str = ""
+
+    @property
+    def figures(self) -> tuple[Figure, ...]:
+        """Every figure of it."""
+        blocks = (block for section in self.sections for block in section.blocks)
+        return tuple(each for block in blocks if isinstance(block, Figures) for each in block.figures)
 
 
 def look(verdict: str) -> str:
