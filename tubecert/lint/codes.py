@@ -1,9 +1,12 @@
-"""The finding codes of this room, each with its one-line meaning."""
+"""The finding codes of this room, each with its one-line meaning, and how findings are made."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Final
+
+from tubecert.findings import Finding, Severity
+from tubecert.spec import Spec
 
 UNUSED: Final = "TC130"
 CONFUSABLE: Final = "TC131"
@@ -64,3 +67,10 @@ CODES: Final[Mapping[str, str]] = {
     PLAN_BEYOND_LIMITS: "an input of the plan is beyond the limits",
     LEFT_OUT: "what is read and no part of what is proven",
 }
+
+
+def finding(
+    spec: Spec, code: str, path: str, message: str, help: str = "", *, severity: Severity = Severity.WARNING
+) -> Finding:
+    """What is said of the key at a path."""
+    return Finding(code=code, severity=severity, message=message, location=spec.location(path), help=help)

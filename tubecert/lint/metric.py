@@ -17,6 +17,7 @@ from tubecert.expression import Expression, is_zero
 from tubecert.expression.matrix import jacobian
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
+from tubecert.lint.codes import finding
 from tubecert.lint.floats import floats, nearest
 from tubecert.lint.plan import curve_of
 from tubecert.model import TIME, ControlAffineModel, build, place
@@ -70,22 +71,20 @@ def _at(spec: Spec, point: Array) -> str:
 
 
 def _indefinite(spec: Spec, point: Array, lowest: float) -> Finding:
-    return Finding(
-        code=codes.INDEFINITE,
-        message=f"W is not positive definite: its smallest eigenvalue is {near(lowest, 3)} at {_at(spec, point)}",
-        location=spec.location("metric.dual_metric"),
-        help="give another dual metric, or shrink the safe set",
+    message = (
+        f"W is not positive definite: its smallest eigenvalue is {near(lowest, 3)} at {_at(spec, point)}"
     )
+    help = "give another dual metric, or shrink the safe set"
+    return finding(spec, codes.INDEFINITE, "metric.dual_metric", message, help, severity=Severity.ERROR)
 
 
 def _killing(spec: Spec, model: ControlAffineModel) -> Iterator[Finding]:
     for j, name in enumerate(model.inputs):
         if any(is_zero(e) is False for row in model.killing_defect(j) for e in row):
-            yield Finding(
-                code=codes.NOT_KILLING,
-                message=f"C3 fails for the input {name}: d_b W - b_x W - W b_x' is not zero",
-                location=spec.location("metric.dual_metric"),
-                help="where B is constant, W may not depend on the states that inputs drive directly",
+            message = f"C3 fails for the input {name}: d_b W - b_x W - W b_x' is not zero"
+            help = "where B is constant, W may not depend on the states that inputs drive directly"
+            yield finding(
+                spec, codes.NOT_KILLING, "metric.dual_metric", message, help, severity=Severity.ERROR
             )
 
 
@@ -117,13 +116,12 @@ def _contraction(spec: Spec, model: ControlAffineModel, points: Array, W: Array)
         wrong = (
             "no rate will do: are the signs right, and is it W and not its inverse? tubecert synth finds one"
         )
-        yield Finding(
-            code=codes.NOT_CONTRACTING,
-            message=f"C2 fails at {_at(spec, points[k])}: at rate {near(rate)} the metric does not contract; "
-            f"there {word}",
-            location=spec.location("metric.rate"),
-            help=slower if largest[k] > 0 else wrong,
+        message = (
+            f"C2 fails at {_at(spec, points[k])}: at rate {near(rate)} the metric does not contract; "
+            f"there {word}"
         )
+        help = slower if largest[k] > 0 else wrong
+        yield finding(spec, codes.NOT_CONTRACTING, "metric.rate", message, help, severity=Severity.ERROR)
 
 
 def _definite(matrices: Array) -> bool:
@@ -147,15 +145,20 @@ def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:
         ("upper", upper, most[k], k, False, upper > _LOOSE * most[k]),
     ):
         if broken or loose:
-            yield Finding(
-                code=codes.BROKEN_METRIC_BOUND if broken else codes.LOOSE_METRIC_BOUND,
-                severity=Severity.ERROR if broken else Severity.WARNING,
-                message=f"{name} is declared as {near(declared)}, but an eigenvalue of M is {near(found, 4)} at "
+            message = (
+                f"{name} is declared as {near(declared)}, but an eigenvalue of M is {near(found, 4)} at "
                 f"{_at(spec, points[at])}"
                 if broken
-                else f"{name} is declared as {near(declared)}, but about {near(found, 3)} would do",
-                location=spec.location(f"metric.bounds.{name}"),
-                help="declare what holds, or remove metric.bounds: they are derived",
+                else f"{name} is declared as {near(declared)}, but about {near(found, 3)} would do"
+            )
+            help = "declare what holds, or remove metric.bounds: they are derived"
+            yield finding(
+                spec,
+                codes.BROKEN_METRIC_BOUND if broken else codes.LOOSE_METRIC_BOUND,
+                f"metric.bounds.{name}",
+                message,
+                help,
+                severity=Severity.ERROR if broken else Severity.WARNING,
             )
 
 
@@ -197,15 +200,10 @@ def reach_findings(spec: Spec) -> list[Finding]:
     message = f"{'at the equilibrium' if held else 'along the plan'}, no input reaches {what}, which {speed}"
     if spec.hardware is None:
         message += f": no metric {within}contracts at {f'the rate {near(rate)}' if rate else 'any rate'}"
-    return [
-        Finding(
-            code=codes.SLOW_MODE,
-            severity=Severity.WARNING if spec.hardware is None else Severity.NOTE,
-            message=message,
-            location=spec.location("metric.rate") or spec.location("trajectory"),
-            help=f"{lower}add an input that moves it, or leave it out of the states",
-        )
-    ]
+    severity = Severity.WARNING if spec.hardware is None else Severity.NOTE
+    path = "metric.rate" if spec.location("metric.rate") else "trajectory"
+    help = f"{lower}add an input that moves it, or leave it out of the states"
+    return [finding(spec, codes.SLOW_MODE, path, message, help, severity=severity)]
 
 
 def _unreached(A: Array, B: Array) -> Array:

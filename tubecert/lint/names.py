@@ -18,8 +18,9 @@ from tubecert.expression import (
     to_text,
     topological,
 )
-from tubecert.findings import Finding, Location, Severity
+from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
+from tubecert.lint.codes import finding
 from tubecert.spec import Spec
 
 _WORDS = (*FUNCTIONS, "pi", "t")
@@ -56,13 +57,9 @@ def _unused(spec: Spec) -> Iterator[Finding]:
     named += [("table", table.name) for table in spec.tables]
     for what, name in [*named, *(("definition", name) for name in spec.definitions)]:
         if words.count(name) < 2:
-            yield Finding(
-                code=codes.UNUSED,
-                severity=Severity.WARNING,
-                message=f"the {what} {name} is never used",
-                location=spec.location(f"system.{what}s.{name}"),
-                help="remove it, or use it",
-            )
+            message = f"the {what} {name} is never used"
+            help = "remove it, or use it"
+            yield finding(spec, codes.UNUSED, f"system.{what}s.{name}", message, help)
 
 
 def _confusable(spec: Spec) -> Iterator[Finding]:
@@ -94,13 +91,9 @@ def _negative(spec: Spec) -> Iterator[Finding]:
     lowest = [*spec.parameters, *((name, low) for name, (low, _) in spec.ranges)]
     for name, value in lowest:
         if value <= 0 and _BODY.fullmatch(name):
-            yield Finding(
-                code=codes.NOT_POSITIVE,
-                severity=Severity.WARNING,
-                message=f"{name} is {number_text(value)}; masses, inertias and lengths are positive",
-                location=spec.location(f"system.parameters.{name}"),
-                help="write its value, or another name if it is something else",
-            )
+            message = f"{name} is {number_text(value)}; masses, inertias and lengths are positive"
+            help = "write its value, or another name if it is something else"
+            yield finding(spec, codes.NOT_POSITIVE, f"system.parameters.{name}", message, help)
 
 
 def _customary(first: str, second: str) -> bool:
@@ -113,33 +106,22 @@ def _folded(name: str) -> str:
 
 
 def _alike(spec: Spec, name: str, message: str) -> Finding:
-    return Finding(
-        code=codes.CONFUSABLE,
-        severity=Severity.WARNING,
-        message=message,
-        location=_place(spec, name),
-        help="choose names that differ by more than case or shape",
-    )
-
-
-def _place(spec: Spec, name: str) -> Location | None:
+    path = f"system.{'definitions' if name in spec.definitions else 'parameters'}.{name}"
     for key, names in (("states", spec.states), ("inputs", spec.inputs)):
         if name in names:
-            return spec.location(f"system.{key}[{names.index(name)}]")
-    return spec.location(f"system.{'definitions' if name in spec.definitions else 'parameters'}.{name}")
+            path = f"system.{key}[{names.index(name)}]"
+    return finding(
+        spec, codes.CONFUSABLE, path, message, "choose names that differ by more than case or shape"
+    )
 
 
 def _units(spec: Spec) -> Iterator[Finding]:
     given = dict(spec.units)
     missing = [name for name in (*spec.states, *spec.inputs) if name not in given]
     if given and missing:
-        yield Finding(
-            code=codes.UNITS,
-            severity=Severity.NOTE,
-            message=f"no unit is given for {', '.join(missing)}",
-            location=spec.location("system.units"),
-            help='write "1" for what has no dimension',
-        )
+        message = f"no unit is given for {', '.join(missing)}"
+        help = 'write "1" for what has no dimension'
+        yield finding(spec, codes.UNITS, "system.units", message, help, severity=Severity.NOTE)
 
 
 def turned(spec: Spec, name: str) -> list[Expression]:
@@ -154,13 +136,9 @@ def turned(spec: Spec, name: str) -> list[Expression]:
 def _degrees(spec: Spec) -> Iterator[Finding]:
     for name, unit in spec.units:
         if _DEGREES.search(unit) and (own := turned(spec, name)):
-            yield Finding(
-                code=codes.UNITS,
-                severity=Severity.NOTE,
-                message=f"{name} is in {unit}, and {to_text(own[0])[:60]} takes radians",
-                location=spec.location(f"system.units.{name}"),
-                help=f"let {name} be in rad (numbers may be written in degrees: 30 deg), or write pi/180*{name} there",
-            )
+            message = f"{name} is in {unit}, and {to_text(own[0])[:60]} takes radians"
+            help = f"let {name} be in rad (numbers may be written in degrees: 30 deg), or write pi/180*{name} there"
+            yield finding(spec, codes.UNITS, f"system.units.{name}", message, help, severity=Severity.NOTE)
 
 
 def _many_turns(spec: Spec) -> Iterator[Finding]:
@@ -173,14 +151,12 @@ def _many_turns(spec: Spec) -> Iterator[Finding]:
         own = next((e for e, slope in slopes if slope.is_constant and abs(slope.fraction) == 1), None)
         if own is not None:
             low, high = map(number_text, ends)
-            yield Finding(
-                code=codes.UNITS,
-                severity=Severity.WARNING,
-                message=f"safe_set.{name} is [{low[:20]}, {high[:20]}], and {to_text(own)[:60]} takes radians: "
-                f"that is {near(float(max(map(abs, ends))) / (2 * math.pi), 2)} turns",
-                location=spec.location(f"safe_set.{name}"),
-                help=f"if these are degrees, write [{low[:20]} deg, {high[:20]} deg]",
+            message = (
+                f"safe_set.{name} is [{low[:20]}, {high[:20]}], and {to_text(own)[:60]} takes radians: "
+                f"that is {near(float(max(map(abs, ends))) / (2 * math.pi), 2)} turns"
             )
+            help = f"if these are degrees, write [{low[:20]} deg, {high[:20]} deg]"
+            yield finding(spec, codes.UNITS, f"safe_set.{name}", message, help)
 
 
 def _unit_of_time(spec: Spec) -> Iterator[Finding]:
@@ -190,14 +166,12 @@ def _unit_of_time(spec: Spec) -> Iterator[Finding]:
         rate = str(term.expression.value) if term.expression.op == "symbol" else ""
         found = _PER_TIME.fullmatch(units.get(rate, ""))
         if found and found[1] == units.get(name):
-            yield Finding(
-                code=codes.UNITS,
-                severity=Severity.NOTE,
-                message=f"f has {name}' = {rate}, in {units[rate]}: the time of this file is in {found[2]}",
-                location=spec.location(f"system.units.{rate}"),
-                help=f"nothing is converted: horizons are in {found[2]} and rates in 1/{found[2]} then, whatever a "
-                "report calls them; or write the dynamics in seconds",
+            message = f"f has {name}' = {rate}, in {units[rate]}: the time of this file is in {found[2]}"
+            help = (
+                f"nothing is converted: horizons are in {found[2]} and rates in 1/{found[2]} then, whatever a "
+                "report calls them; or write the dynamics in seconds"
             )
+            yield finding(spec, codes.UNITS, f"system.units.{rate}", message, help, severity=Severity.NOTE)
             return
 
 
@@ -205,30 +179,18 @@ def _idle(spec: Spec) -> Iterator[Finding]:
     for i, (drift, row) in enumerate(zip(spec.f, spec.B, strict=True)):
         if drift.expression is ZERO and all(term.expression is ZERO for term in row):
             name = spec.states[i]
-            yield Finding(
-                code=codes.IDLE_STATE,
-                severity=Severity.WARNING,
-                message=f"{name} cannot change: its rows in f and B are zero, so nothing brings it back",
-                location=spec.location(f"system.f[{i}]"),
-                help=f"make {name} a parameter",
-            )
+            message = f"{name} cannot change: its rows in f and B are zero, so nothing brings it back"
+            help = f"make {name} a parameter"
+            yield finding(spec, codes.IDLE_STATE, f"system.f[{i}]", message, help)
 
 
 def _expectation(spec: Spec) -> Iterator[Finding]:
     expect = spec.expect
     if expect is None and spec.lacks:
-        yield Finding(
-            code=codes.METRIC_ALONE,
-            severity=Severity.NOTE,
-            message="this asks about a metric alone: there is neither uncertainty nor trajectory",
-            location=spec.location("metric"),
-            help="write expect: {metric: holds}, or add the sections that are missing",
-        )
+        message = "this asks about a metric alone: there is neither uncertainty nor trajectory"
+        help = "write expect: {metric: holds}, or add the sections that are missing"
+        yield finding(spec, codes.METRIC_ALONE, "metric", message, help, severity=Severity.NOTE)
     if expect is not None and not (expect.verdict or expect.metric or expect.ranges):
-        yield Finding(
-            code=codes.EMPTY_EXPECTATION,
-            severity=Severity.WARNING,
-            message="expect names nothing that is expected",
-            location=spec.location("expect"),
-            help=f"write expect: {{{'metric: holds' if spec.lacks else 'verdict: certified'}}}, or remove it",
-        )
+        message = "expect names nothing that is expected"
+        help = f"write expect: {{{'metric: holds' if spec.lacks else 'verdict: certified'}}}, or remove it"
+        yield finding(spec, codes.EMPTY_EXPECTATION, "expect", message, help)

@@ -18,6 +18,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
+from tubecert.lint.codes import finding
 from tubecert.lint.floats import floats, nearest
 from tubecert.lint.names import turned
 from tubecert.lint.room import least_radius, room_findings
@@ -104,12 +105,9 @@ def _start(spec: Spec) -> Iterator[Finding]:
             value = least if least < low else most
             name = spec.states[i]
             path = f"initial_state.{'box' if spec.start_box else 'at'}[{i}]"
-            yield Finding(
-                code=codes.START_OUTSIDE,
-                message=f"the initial state is not in the safe set: {name} = {number_text(value)[:40]}",
-                location=spec.location(path),
-                help=f"the safe set has {name} in [{number_text(low)[:40]}, {number_text(high)[:40]}]",
-            )
+            message = f"the initial state is not in the safe set: {name} = {number_text(value)[:40]}"
+            help = f"the safe set has {name} in [{number_text(low)[:40]}, {number_text(high)[:40]}]"
+            yield finding(spec, codes.START_OUTSIDE, path, message, help, severity=Severity.ERROR)
 
 
 def _outside(spec: Spec, curve: Curve) -> Iterator[Finding]:
@@ -121,12 +119,8 @@ def _outside(spec: Spec, curve: Curve) -> Iterator[Finding]:
         low, high = map(nearest, spec.safe_set[i])
         if spec.trajectory.table and turned(spec, name) and low <= math.radians(curve.x[k, i]) <= high:
             help += f"; a column in degrees is said by trajectory.columns: {{{name}: {{scale: 1 deg}}}}"
-        yield Finding(
-            code=codes.PLAN_OUTSIDE,
-            message=f"the plan leaves the safe set{when}: {name} = {near(curve.x[k, i])}",
-            location=spec.location(curve.path),
-            help=help,
-        )
+        message = f"the plan leaves the safe set{when}: {name} = {near(curve.x[k, i])}"
+        yield finding(spec, codes.PLAN_OUTSIDE, curve.path, message, help, severity=Severity.ERROR)
 
 
 def _beyond_limits(spec: Spec, curve: Curve) -> Iterator[Finding]:
@@ -144,14 +138,16 @@ def _beyond_limits(spec: Spec, curve: Curve) -> Iterator[Finding]:
         if beyond[k] > _ROUNDING * max(abs(nearest(low)), abs(nearest(high))):
             when = "" if len(curve.t) == 1 else f" at t = {near(curve.t[k], 4)} s"
             held = plan.kind == "equilibrium"
-            yield Finding(
-                code=codes.PLAN_BEYOND_LIMITS,
-                severity=Severity.WARNING,
-                message=f"the plan's input {name} is {near(u[k])}{when}, beyond its limits: "
-                f"[{number_text(low)[:40]}, {number_text(high)[:40]}]",
-                location=spec.location("trajectory.input" if held else "trajectory.u"),
-                help=f"{'hold another point' if held else 'plan with less of it'}, or give limits.{name} more room: "
-                "what feedback and adaptation need comes on top",
+            message = (
+                f"the plan's input {name} is {near(u[k])}{when}, beyond its limits: "
+                f"[{number_text(low)[:40]}, {number_text(high)[:40]}]"
+            )
+            help = (
+                f"{'hold another point' if held else 'plan with less of it'}, or give limits.{name} more room: "
+                "what feedback and adaptation need comes on top"
+            )
+            yield finding(
+                spec, codes.PLAN_BEYOND_LIMITS, "trajectory.input" if held else "trajectory.u", message, help
             )
 
 
@@ -167,10 +163,8 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
         rate = slope.run_floats([curve.t], curve.t.shape) - rate
     size = np.linalg.norm(rate, axis=0)
     k = int(np.argmax(np.nan_to_num(size, nan=0.0)))
-    worst, scale = (
-        float(size[k]),
-        1e-12 * float(np.max(np.abs(np.concatenate([curve.x[k], curve.u[k], [1.0]])))),
-    )
+    worst, largest = float(size[k]), np.max(np.abs(np.concatenate([curve.x[k], curve.u[k], [1.0]])))
+    scale = 1e-12 * float(largest)
     if not worst > scale:
         return
     bearable = nearest(model.rate) * least_radius(spec) if spec.hardware is None else _bearable(spec)
@@ -190,21 +184,13 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
             there = f"input: [{', '.join(near(value, 12) for value in curve.u[0])}]"
             digits = "" if near_by == there else f"more digits{near_by and f' ({near_by})'}, or "
             help = f"nothing is wrong: the proof counts it in; {digits}expressions (input: [m*g]) help"
-        yield Finding(
-            code=codes.NO_EQUILIBRIUM,
-            severity=Severity.WARNING if notable else Severity.NOTE,
-            message=message,
-            location=spec.locations.get("trajectory.input") or spec.location("trajectory.at"),
-            help=help,
-        )
+        path = "trajectory.input" if "trajectory.input" in spec.locations else "trajectory.at"
+        severity = Severity.WARNING if notable else Severity.NOTE
+        yield finding(spec, codes.NO_EQUILIBRIUM, path, message, help, severity=severity)
     elif notable:
-        yield Finding(
-            code=codes.PLAN_DEFECT,
-            severity=Severity.WARNING,
-            message=f"the plan misses x*' = f + B u* by {near(worst, 3)} at t = {near(curve.t[k], 4)} s",
-            location=spec.location("trajectory.u"),
-            help=f"correct x or u there; {paid(spec)}",
-        )
+        message = f"the plan misses x*' = f + B u* by {near(worst, 3)} at t = {near(curve.t[k], 4)} s"
+        help = f"correct x or u there; {paid(spec)}"
+        yield finding(spec, codes.PLAN_DEFECT, "trajectory.u", message, help)
 
 
 def _equilibrium(spec: Spec) -> str:
@@ -228,22 +214,14 @@ def _obstacles(spec: Spec, curve: Curve) -> Iterator[Finding]:
         i, k = (spec.states.index(name) for name in obstacle.states)
         path = f"obstacles[{j}]"
         if _apart(obstacle, spec.safe_set[i], spec.safe_set[k]):
-            yield Finding(
-                code=codes.OBSTACLE_OUTSIDE,
-                severity=Severity.NOTE,
-                message="the obstacle lies outside the safe set",
-                location=spec.location(path),
-                help="a tube in the safe set cannot meet it",
-            )
+            message = "the obstacle lies outside the safe set"
+            help = "a tube in the safe set cannot meet it"
+            yield finding(spec, codes.OBSTACLE_OUTSIDE, path, message, help, severity=Severity.NOTE)
         hit = next((t for t, x in zip(curve.t, curve.x, strict=True) if _covers(obstacle, x[i], x[k])), None)
         if hit is not None:
-            yield Finding(
-                code=codes.COLLISION,
-                severity=Severity.WARNING,
-                message=f"the plan meets the obstacle at t = {near(hit, 4)} s",
-                location=spec.location(path),
-                help="plan around it: no tube around this plan keeps away from the obstacle",
-            )
+            message = f"the plan meets the obstacle at t = {near(hit, 4)} s"
+            help = "plan around it: no tube around this plan keeps away from the obstacle"
+            yield finding(spec, codes.COLLISION, path, message, help)
 
 
 def _apart(obstacle: Obstacle, first: tuple[Fraction, Fraction], second: tuple[Fraction, Fraction]) -> bool:

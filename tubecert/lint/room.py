@@ -14,8 +14,9 @@ import numpy as np
 
 from tubecert.digits import near
 from tubecert.enclosure.interval import Array
-from tubecert.findings import Finding
+from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
+from tubecert.lint.codes import finding
 from tubecert.lint.floats import floats, nearest
 from tubecert.spec import Spec
 
@@ -75,14 +76,10 @@ def _too_wide(spec: Spec, t: Array, x: Array, sides: Array, radius: str) -> Iter
         if radius
         else f"the tube reaches {name}* +-{near(side, 4)}"
     )
-    yield Finding(
-        code=codes.NO_ROOM,
-        message=f"{reaches}, but{when} the plan is only {near(room, 4)} from the {name} side of the safe set",
-        location=spec.location(asked or "tube") or spec.location("safe_set"),
-        help=f"half_widths.{name} of at most {near(room, 4)} fits; or enlarge the safe set"
-        if asked
-        else _LESS,
-    )
+    message = f"{reaches}, but{when} the plan is only {near(room, 4)} from the {name} side of the safe set"
+    fits = f"half_widths.{name} of at most {near(room, 4)} fits; or enlarge the safe set"
+    path = (asked or "tube") if spec.location(asked or "tube") else "safe_set"
+    yield finding(spec, codes.NO_ROOM, path, message, fits if asked else _LESS, severity=Severity.ERROR)
 
 
 def _outside(spec: Spec, offset: Array, sides: Array) -> Finding:
@@ -94,12 +91,10 @@ def _outside(spec: Spec, offset: Array, sides: Array) -> Finding:
         if off > side
         else " in a direction in which the tube is thin"
     )
-    return Finding(
-        code=codes.START_OUTSIDE,
-        message=f"the initial state is outside of the tube: {name} is {near(off, 4)} from the plan's{beyond}",
-        location=spec.location("initial_state") or spec.location("trajectory"),
-        help="start nearer to the plan, or ask for larger half-widths",
-    )
+    message = f"the initial state is outside of the tube: {name} is {near(off, 4)} from the plan's{beyond}"
+    help = "start nearer to the plan, or ask for larger half-widths"
+    path = "initial_state" if spec.location("initial_state") else "trajectory"
+    return finding(spec, codes.START_OUTSIDE, path, message, help, severity=Severity.ERROR)
 
 
 def _asked_radius(spec: Spec) -> float:

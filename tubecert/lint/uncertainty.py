@@ -15,6 +15,7 @@ from tubecert.expression import ZERO, derivatives, free_symbols
 from tubecert.expression.matrix import Matrix, column, jacobian
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
+from tubecert.lint.codes import finding
 from tubecert.lint.floats import nearest
 from tubecert.model import TIME, build, place
 from tubecert.spec import Spec
@@ -44,22 +45,13 @@ def _declared_zero(spec: Spec) -> Iterator[Finding]:
             spec, "uncertainty.bounds.h", "|h| is bounded by 0: there is no uncertainty to compensate"
         )
     if bounds is not None and bounds.h and bounds.h_t == bounds.h_x == 0:
-        yield Finding(
-            code=codes.NO_UNCERTAINTY,
-            severity=Severity.NOTE,
-            message="h_x and h_t are 0: the uncertainty is an unknown constant",
-            location=spec.location("uncertainty.bounds"),
-        )
+        message = "h_x and h_t are 0: the uncertainty is an unknown constant"
+        yield finding(spec, codes.NO_UNCERTAINTY, "uncertainty.bounds", message, severity=Severity.NOTE)
 
 
 def _nothing(spec: Spec, path: str, message: str) -> Finding:
-    return Finding(
-        code=codes.NO_UNCERTAINTY,
-        severity=Severity.NOTE,
-        message=message,
-        location=spec.location(path),
-        help="give the uncertainty that is expected, or control without adaptation",
-    )
+    help = "give the uncertainty that is expected, or control without adaptation"
+    return finding(spec, codes.NO_UNCERTAINTY, path, message, help, severity=Severity.NOTE)
 
 
 def _bounds(spec: Spec, time: Range | None, effort: Effort) -> Iterator[Finding]:
@@ -97,19 +89,15 @@ def _against(spec: Spec, name: str, declared: Fraction, needed: Supremum | None)
     path = f"uncertainty.bounds.{name}"
     above = needed.above if needed else 0.0
     if nearest(declared) > _LOOSE * above:
-        yield Finding(
-            code=codes.LOOSE_BOUND,
-            severity=Severity.WARNING,
-            message=f"{name} is declared as {near(nearest(declared))}, but on the safe set {near(above, 3)} suffices",
-            location=spec.location(path),
-            help="declare less, or remove it: it is derived from the expression; a loose bound costs gain",
+        message = (
+            f"{name} is declared as {near(nearest(declared))}, but on the safe set {near(above, 3)} suffices"
         )
+        help = "declare less, or remove it: it is derived from the expression; a loose bound costs gain"
+        yield finding(spec, codes.LOOSE_BOUND, path, message, help)
     elif needed and math.isfinite(needed.below) and Fraction(needed.below) > declared:
-        yield Finding(
-            code=codes.BROKEN_BOUND,
-            severity=Severity.WARNING,
-            message=f"{name} is declared as {near(nearest(declared))}, but its expression reaches "
-            f"{near(needed.below, 4)} in the safe set, at {place(needed.at)}",
-            location=spec.location(path),
-            help="declare more, unless the tube stays away from there",
+        message = (
+            f"{name} is declared as {near(nearest(declared))}, but its expression reaches "
+            f"{near(needed.below, 4)} in the safe set, at {place(needed.at)}"
         )
+        help = "declare more, unless the tube stays away from there"
+        yield finding(spec, codes.BROKEN_BOUND, path, message, help)
