@@ -81,6 +81,8 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("rate: 0.4", "rate: ~", "TC108", 22, 9, "write a number such as 0.1 or 1e-3"),
     ("rate: 0.4", "rate: None", "TC108", 22, 9, "write a number such as 0.1 or 1e-3"),
     ("rate: 0.4", "rate:", "TC108", 22, 8, "write a number such as 0.1 or 1e-3"),
+    (PLAN, "", "TC105", 1, 1, "add trajectory: {kind: equilibrium, at: [...]}, or another"),
+    ("uncertainty:\n  h: [\"0.1*sin(t) + 0.05*v\"]\n", "", "TC105", 1, 1, 'add uncertainty: {h: ["..."]}, an expression'),
     ("inputs: [F]", "inputs: []", "TC107", 5, 11, "name what it could move, with its column of B;"),
     ("states: [z, v]", "states: []", "TC107", 4, 11, "has 0 entries; there must be 1 to 32"),
     ("duration: 5", "duration: 1:30", "TC108", 28, 24, "write it as one decimal number, times in"),

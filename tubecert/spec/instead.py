@@ -23,9 +23,10 @@ def glued(key: str, known: Collection[str]) -> str:
     return f"write `{name}: {value[:40]}`, with a blank after the colon" if colon and name in known else ""
 
 
-def example_of(key: str) -> str:
-    """How a key that is missing may be written."""
-    return f"{key}: {elsewhere('examples').get(key, '...')}"
+def example_of(key: str, *, missing: bool = True) -> str:
+    """How a key may be written that is missing, or has another name."""
+    whole = elsewhere("missing").get(key, "...") if missing else "..."
+    return f"{key}: {elsewhere('examples').get(key, whole)}"
 
 
 def of_key(key: str, known: Sequence[str]) -> tuple[str, list[str]]:
@@ -33,7 +34,7 @@ def of_key(key: str, known: Sequence[str]) -> tuple[str, list[str]]:
     if key.isdecimal():
         return "if a comma was meant as a decimal point, write the point: 0.1", []
     if (other := same_as(key, known)) is not None:
-        return f"it is called {example_of(other)}", [other]
+        return f"it is called {example_of(other, missing=False)}", [other]
     said, close = elsewhere("keys").get(key), near(key, known)
     meant = elsewhere("meant").get(key, "").split() if said else close
     if place := elsewhere("places").get(key):
