@@ -17,6 +17,7 @@ from tubecert.model import build
 from tubecert.sampled_loop import responses
 from tubecert.sampled_loop.cells import largest_jump, steepness
 from tubecert.sampled_loop.matrices import product
+from tubecert.sampled_loop.obstacles import cleared
 from tubecert.sampled_loop.record import Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Acting, Dynamics, Responses
@@ -587,3 +588,21 @@ def test_cuts_are_lags():
     loop = loop_of(uncertainty="{h: ['0.1*sin(t)']}")
     for cut, verdict in ((-1, "undecided"), (0, "certified"), (6, "undecided")):
         assert judged(loop, controller_of(), (0, [1], 9), cut=cut).verdict.value == verdict
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "verdict"),
+    [
+        ("polygon: [[1, 1], [2, 1], [1, 2]]", "certified"),
+        ("polygon: [[-3, -3], [3, -3], [0, 4]]", "undecided"),  # around it
+        ("polygon: [['-0.05', 1], [1, '-0.05'], [1, 1]]", "certified"),  # its box is met, and no edge
+        ("polygon: [['0.05', 1], ['0.05', -4], [1, 1]]", "undecided"),
+        ("disc: {center: [1, 0], radius: 0.89}", "certified"),
+        ("disc: {center: [1, 0], radius: 0.91}", "undecided"),
+        ("disc: {center: [0, 0], radius: 3}", "undecided"),
+    ],
+)
+def test_obstacles_keep_out_of_boxes_about_the_plan(obstacle, verdict):
+    loop = loop_of(**DOUBLE, A=[[0, 1], [0, 0]], B=[[0], [1]], obstacles=f"[{{{obstacle}}}]")
+    (found,) = cleared(loop, np.array([[0.1, 0.2]]), [0])
+    assert found.verdict == verdict

@@ -140,9 +140,7 @@ class _Gaps:
         """
         start = np.zeros(1)
         apart = bool(self.over(start, start).lo[0] > 0)
-        return apart and (
-            self._obstacle.radius is not None or not _contains(self._obstacle.polygon, self.place(0.0))
-        )
+        return apart and not self._obstacle.contains(*map(Fraction, self.place(0.0)))
 
     def place(self, t: float) -> tuple[float, float]:
         """x* in the plane at a time, nearly."""
@@ -198,19 +196,6 @@ def _least(gaps: _Gaps, plan: Plan, effort: Effort) -> Clearance:
     return Clearance(below=min(done, best), above=best, t=at)
 
 
-def _contains(corners: tuple[Vector, ...], point: tuple[float, float]) -> bool:
-    """Whether a polygon contains a point (exact, for a point that is on no edge).
-
-    By how often a ray from it crosses the boundary: Jordan's lemma for polygons.
-    """
-    x, y = map(Fraction, point)
-    inside = False
-    for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
-        if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
-            inside = not inside
-    return inside
-
-
 def _met(gaps: _Gaps, obstacle: Obstacle, section: Section, t: float) -> tuple[float, float] | None:
     """A point of the obstacle, exact as floats, that is proven to lie in the tube at a time; None if none was found.
 
@@ -221,7 +206,7 @@ def _met(gaps: _Gaps, obstacle: Obstacle, section: Section, t: float) -> tuple[f
     for y in _nearest(obstacle, place):
         away = [Interval.exact(y[i]) - p[i] for i in (0, 1)]
         square = Interval.exact(section.upper) * (away[0] ** 2 + away[1] ** 2)
-        if bool(square.hi < (section.reach * section.reach).lo) and _belongs(obstacle, y):
+        if bool(square.hi < (section.reach * section.reach).lo) and obstacle.contains(*map(Fraction, y)):
             return y
     return None
 
@@ -247,11 +232,3 @@ def _nearest(obstacle: Obstacle, p: tuple[float, float]) -> list[tuple[float, fl
         found += [on + side, on - side, on + 1e-6 * (middle - on)]
     order = sorted(found, key=lambda y: float(np.hypot(*(y - point))))
     return [(float(y[0]), float(y[1])) for y in order]
-
-
-def _belongs(obstacle: Obstacle, y: tuple[float, float]) -> bool:
-    """Whether a point lies in the obstacle, decided exactly."""
-    if obstacle.radius is None:
-        return _contains(obstacle.polygon, y)
-    away = [Fraction(value) - centre for value, centre in zip(y, obstacle.center, strict=True)]
-    return away[0] ** 2 + away[1] ** 2 <= obstacle.radius**2

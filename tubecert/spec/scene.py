@@ -142,6 +142,16 @@ class Obstacle:
     def __post_init__(self) -> None:
         assert (len(self.polygon) >= 3) == (self.radius is None)
 
+    def contains(self, x: Fraction, y: Fraction) -> bool:
+        """Whether a point lies in it: exact, for one that is on no edge, by Jordan's lemma for polygons."""
+        if self.radius is not None:
+            return (x - self.center[0]) ** 2 + (y - self.center[1]) ** 2 <= self.radius**2
+        inside = False
+        for (ax, ay), (bx, by) in zip(self.polygon, (*self.polygon[1:], self.polygon[0]), strict=True):
+            if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
+                inside = not inside
+        return inside
+
 
 OBSTACLE: Final = section(Obstacle, oneOf=[{"required": ["polygon"]}, {"required": ["disc"]}])
 
