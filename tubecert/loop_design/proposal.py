@@ -29,7 +29,8 @@ _SHORTER: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the lags, where they are 
 _STEPS: Final = 200
 _STEADY: Final = 0.9  # a long run that is not narrower than this of the tube is no stage of its own
 _STAGES: Final = (32, 8, 3, 1)
-_WIDER: Final = 1 + 1e-3
+_WIDER: Final = 1 + 1e-3  # what another arithmetic finds has to be inside as well
+_INSIDE: Final = 1 - 1e-5
 _DIGITS: Final = 7
 
 Report = Callable[[int, Array], None]
@@ -52,7 +53,7 @@ def propose(
     )
     rough = Inequalities.made(remainders, controller, recipe)
     found = replace(rough, recipe=replace(recipe, cuts=_cuts(rough)))
-    boxes = _fixed_point(found, _nothing(found), report)
+    boxes = _fixed_point(found, report)
     for panels in _PARTS[1:]:
         finer = Inequalities.made(remainders, controller, replace(found.recipe, panels=panels))
         if np.max(1 - finer.of(boxes).W / np.maximum(found.of(boxes).W, 1e-300)) < _SETTLED:
@@ -60,15 +61,15 @@ def propose(
         found = finer
     if (pieces := _pieces(found, boxes)) > _PARTS[0]:
         found = Inequalities.made(remainders, controller, replace(found.recipe, pieces=pieces))
-    boxes = _fixed_point(found, boxes, report)
+    boxes = _fixed_point(found, report)
     if (several := _in_stages(found)) is not None:
-        many = _fixed_point(several, _nothing(several), report)
+        many = _fixed_point(several, report)
         if (many.W[-1] < _STEADY * many.W.max(axis=0)).any():
             found, boxes = several, many
     for share in _SHORTER:
         fewer = _shorter(found, max(1, int(share * lags)))
         if _within(fewer.of(boxes), boxes, 1 + _SETTLED):
-            found, boxes = fewer, _fixed_point(fewer, boxes, report)
+            found, boxes = fewer, _fixed_point(fewer, report)
             break
     return found, _stages(loop, boxes, found.starts)
 
@@ -120,42 +121,24 @@ def _cuts(inequalities: Inequalities) -> tuple[tuple[int, ...], ...]:
     return tuple(map(tuple, best.tolist()))
 
 
-def _nothing(inequalities: Inequalities) -> Boxes:
+def _fixed_point(inequalities: Inequalities, report: Report | None) -> Boxes:
+    """Boxes that the inequalities map inside themselves: a little more than what follows, from nothing on."""
     loop, stages = inequalities.loop, len(inequalities.starts)
-    sizes = (loop.states, loop.inputs, inequalities.controller.size)
-    return Boxes(*(np.zeros((stages, size)) for size in sizes))
-
-
-def _fixed_point(inequalities: Inequalities, boxes: Boxes, report: Report | None) -> Boxes:
-    """Boxes that the inequalities map into themselves, going on from some."""
-    widest = np.array([float(high - low) for low, high in inequalities.loop.spec.safe_set])
+    boxes = Boxes(*(np.zeros((stages, k)) for k in (loop.states, loop.inputs, inequalities.controller.size)))
+    widest = np.array([float(high - low) for low, high in loop.spec.safe_set])
     with np.errstate(all="ignore"):
         for step in range(_STEPS):
             found = inequalities.of(boxes)
             if report is not None:
                 report(step, found.W[-1])
             if not np.isfinite(found.W).all() or (widest < found.W).any():
-                raise _none(found, widest)
-            if _within(found, boxes, 1 + 1e-4) and _within(boxes, found, 1 + 1e-4):
-                return _kept(inequalities, found, widest)
-            boxes = found
-    raise _none(boxes, widest)
-
-
-def _kept(inequalities: Inequalities, boxes: Boxes, widest: Array) -> Boxes:
-    """Boxes a little wider, which the inequalities map inside themselves; what is quadratic grows most."""
-    wider = Boxes(*(_WIDER * own + 1e-30 for own in boxes))
-    for _ in range(_STEPS):
-        found = inequalities.of(wider)
-        if _within(found, wider, 1 - 1e-5):
-            return wider
-        wider = Boxes(*(np.maximum(old, (1 + 1e-4) * new) for old, new in zip(wider, found, strict=True)))
-    raise _none(wider, widest)
-
-
-def _none(boxes: Boxes, widest: Array) -> NoDesign:
-    """No fixed point was found: where the boxes had grown most."""
-    return NoDesign("no_fixed_point", int(np.argmax(boxes.W[0] / widest)))
+                break
+            if step and _within(found, boxes, _INSIDE):
+                return boxes
+            boxes = Boxes(
+                *(np.maximum(old, _WIDER * new + 1e-30) for old, new in zip(boxes, found, strict=True))
+            )
+    raise NoDesign("no_fixed_point", int(np.argmax(found.W[0] / widest)))
 
 
 def _within(inner: Boxes, outer: Boxes, share: float) -> bool:
