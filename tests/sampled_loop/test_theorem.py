@@ -206,7 +206,8 @@ def test_inputs_that_jump_across_the_end_of_a_plan_that_repeats():
     t, x, u = zip(*(map(Fraction, row) for row in rows), strict=True)
     knots = Knots(t=t, x=tuple((a,) for a in x), u=tuple((a,) for a in u), interpolation="hold")
     loop = loop_of(trajectory=WAVE, hardware="{sample_time: 0.2}")
-    assert 2 <= largest_jump(replace(loop, plan=piecewise_plan(loop.model, knots)))[0] <= 3
+    loop.plan = piecewise_plan(loop.model, knots)
+    assert 2 <= largest_jump(loop)[0] <= 3
 
 
 def rho(loop, W, U=0.0, size=()):

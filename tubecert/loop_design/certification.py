@@ -9,6 +9,7 @@ import hashlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -59,13 +60,13 @@ def ask(spec: Spec, report: Progress | None = None) -> Remainders:
     knots = _knots(spec, model, report)
     n, m, k = len(spec.states), len(spec.inputs), len(model.E[0]) if model.E else 0
     A, B, E = (np.zeros((n, size)) for size in (n, m, k))
-    plan = plan_of(spec, model, knots)
-    blank = Loop(spec=spec, model=model, plan=plan, knots=knots, A=A, B=B, E=E, slow=False)
+    about = partial(Loop, spec=spec, model=model, plan=plan_of(spec, model, knots), knots=knots)
+    blank = about(A=A, B=B, E=E, slow=False)
     if findings := undefined(blank):
         raise SpecError(findings)
     rough = Remainders(blank, _WINDOWS)
     A, B, E = rough.middle()
-    return Remainders(replace(blank, A=A, B=B, E=E, slow=rough.steep is not None), _WINDOWS)
+    return Remainders(about(A=A, B=B, E=E, slow=rough.steep is not None), _WINDOWS)
 
 
 def _knots(spec: Spec, model: ControlAffineModel, report: Progress | None) -> Knots | None:

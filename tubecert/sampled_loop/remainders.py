@@ -38,7 +38,13 @@ class Sizes:
 
 
 class Remainders:
-    """The suprema of one loop over its plan, split into `windows`."""
+    """The suprema of one loop over its plan, split into `windows`.
+
+    Along the plan: `states_above` sup |x*_i| (n,); `inputs_range` inf and sup of u* and `inputs_above` sup |u*_j|, (m,)
+    each; `room`: how far each input may go from the plan's, near, infinite where nothing limits it; `steep`: sup
+    |u*'_j|, None if u* jumps, and what parameters do along the plan has no rate; `held`: sup |u*_j - ubar_j| while a
+    command acts, with the controller's own rounding of the plan (G9).
+    """
 
     def __init__(self, loop: Loop, windows: int) -> None:
         self.loop, self.windows, model = loop, windows, loop.model
@@ -56,29 +62,17 @@ class Remainders:
         self._h = Tape(model.h or (), timed)
         self._h_slopes = Tape([e for row in jacobian(model.h or (), timed) for e in row], timed)
 
-    # -- what is known before there is a tube ------------------------------------------------------------------------
+        low, high = self.inputs_range = self.cells.u.lo.min(axis=0), self.cells.u.hi.max(axis=0)
+        self.states_above = self.cells.x.magnitude.max(axis=0)
+        self.inputs_above = np.maximum(-low, high)
+        limits = dict(loop.spec.limits)
+        least, most = np.array([limits.get(name, (-np.inf, np.inf)) for name in model.inputs], dtype=float).T
+        self.room = np.minimum(most - high, low - least)
+        self.steep = steepness(loop, len(self.cells))
+        self.held = np.asarray((self._holding() + PLAN_ROUNDING * self.inputs_above) * (1 + 1e-15))
 
-    @cached_property
-    def states_above(self) -> Array:
-        """sup |x*_i|, (n,)."""
-        return np.asarray(self.cells.x.magnitude.max(axis=0))
+    # -- along the plan ----------------------------------------------------------------------------------------------
 
-    @cached_property
-    def inputs_range(self) -> tuple[Array, Array]:
-        """inf and sup of u*, (m,) each."""
-        return self.cells.u.lo.min(axis=0), self.cells.u.hi.max(axis=0)
-
-    @cached_property
-    def inputs_above(self) -> Array:
-        """sup |u*_j|, (m,)."""
-        return np.asarray(np.maximum(-self.inputs_range[0], self.inputs_range[1]))
-
-    @cached_property
-    def held(self) -> Array:
-        """sup |u*_j - ubar_j| while a command acts, (m,), with the controller's own rounding of the plan (G9)."""
-        return np.asarray((self._holding + PLAN_ROUNDING * self.inputs_above) * (1 + 1e-15))
-
-    @property
     def _holding(self) -> Array:
         loop = self.loop
         if loop.hold == "continuous" or (self.steep is None and isinstance(loop.plan, Family)):
@@ -87,19 +81,6 @@ class Remainders:
             return largest_jump(loop)
         span = fraction_bounds(loop.sample_time if loop.hold == "left" else loop.sample_time / 2)[1]
         return np.asarray(self.steep * span * (1 + 1e-15))
-
-    @cached_property
-    def steep(self) -> Array | None:
-        """sup |u*'_j|, (m,); None if u* jumps, and what parameters do along the plan has no rate."""
-        return steepness(self.loop, len(self.cells))
-
-    @cached_property
-    def room(self) -> Array:
-        """How far each input may go from the plan's, near, (m,); infinite where nothing limits it."""
-        limits = dict(self.loop.spec.limits)
-        ends = [limits.get(name, (-np.inf, np.inf)) for name in self.loop.model.inputs]
-        low, high = np.array(ends, dtype=float).T
-        return np.asarray(np.minimum(high - self.inputs_range[1], self.inputs_range[0] - low))
 
     @cached_property
     def defect(self) -> Array:

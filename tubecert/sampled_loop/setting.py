@@ -27,7 +27,7 @@ from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.sampled_loop.matrices import lengths, nothing, total
 from tubecert.sampled_loop.record import HexMatrix, Nominal, Tables
 from tubecert.spec import Spec
-from tubecert.spec.types import Afterwards, Hardware, Hold, Knots, Vector
+from tubecert.spec.types import Afterwards, Hold, Knots, Vector
 from tubecert.trajectory.plan import Family, Plan
 
 ROUNDING: Final = {"single": 2.0**-24, "double": 2.0**-53}
@@ -74,171 +74,65 @@ class Start:
         return np.asarray((self.known.magnitude[:, 0] + self.box + self.length) * (1 + 1e-15))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
 class Loop:
     """The sampled loop about its plan; A (n, n), B (n, m), E (n, k) are any floats.
 
-    `slow`: what unknown parameters do along the plan is a component of eta, else it is sudden.
+    `states` n, `inputs` m, `names` of both. Of the delay `whole` samples q, and the `rest` tau' in [0, Ts). `noise` of
+    the measured states; `gusts`: the disturbance w (k,), which `sways` if it has a rate. `matched`: inputs beside which
+    an h acts that is not identically 0; `declared`: bounds of |h|, its slope and its rate, of an h that is not given
+    otherwise; it `jumps` if nothing bounds how fast it changes. `drift` f(x, p) (n,), `gained` B(x, p) (n, m) and
+    `field` F = f + B u; `unknown`: the rows of F with a parameter that is not known; if `slow`, what these do along the
+    plan is a component of eta, else it is sudden. How eta enters, `H` (n, r): h by columns of B, a disturbance that
+    sways by those of E, parameters by rows. How rho enters, `R` (n, n + m): as it is, and by columns of B. `sudden`:
+    what may jump at any time, columns (n, -) and size. `horizon`: until when the claim is, in s, in `samples`
+    intervals; None: for ever.
     """
 
-    spec: Spec
-    model: ControlAffineModel
-    plan: Plan
-    knots: Knots | None
-    A: Array
-    B: Array
-    E: Array
-    slow: bool
+    def __init__(
+        self, *, spec: Spec, model: ControlAffineModel, plan: Plan, knots: Knots | None, A: Array, B: Array, E: Array,
+        slow: bool,
+    ) -> None:  # fmt: skip
+        assert spec.hardware is not None
+        self.spec, self.model, self.plan, self.knots = spec, model, plan, knots
+        self.A, self.B, self.E, self.slow = A, B, E, slow
+        self.states, self.inputs = n, m = len(model.states), len(model.inputs)
+        self.names = (*model.states, *model.inputs)
+        self.hardware, self.sample_time = spec.hardware, spec.hardware.sample_time
+        self.hold: Hold = spec.hardware.hold
+        self.whole, self.rest = divmod(spec.hardware.delayed, self.sample_time)
+        self.noise = Size.of(spec.hardware.noise, n)
+
+        wind, given = spec.disturbance, spec.uncertainty.bounds
+        self.gusts = Size(np.zeros(0), length=False) if wind is None else Size.of(wind.bound, E.shape[1])
+        self.sways = wind is not None and wind.rate is not None
+        bounds = (None,) * 3 if given is None else (given.h, given.h_x, given.h_t)
+        self.declared = np.array([np.inf if each is None else fraction_bounds(each)[1] for each in bounds])
+        self.jumps = model.h is None and not np.isfinite(self.declared[1:]).all()
+        self.matched = tuple(j for j in range(m) if model.h is None or model.h[j] != constant(0))
+        self.drift = model.drift or model.f
+        self.gained: tuple[tuple[Expression, ...], ...] = tuple(map(tuple, model.gained or model.B))
+        self.field = driven(self.drift, self.gained, model.inputs)
+        parameters = {name for name, _ in model.parameters}
+        rows = enumerate(zip(self.drift, self.gained, strict=True))
+        self.unknown = tuple(i for i, (f, row) in rows if parameters & set(free_symbols([f, *row])))
+
+        own = B[:, [] if self.jumps else list(self.matched)]
+        strange = np.eye(n)[:, list(self.unknown if slow else ())]
+        self.H, self.R = np.hstack([own, E if self.sways else E[:, :0], strange]), np.hstack([np.eye(n), B])
+        blown = ((E, self.gusts),) if self.gusts.each.size and not self.sways else ()
+        shaken = (
+            ((B, Size(np.full(m, self.declared[0]), length=m > 1)),) if self.jumps and self.matched else ()
+        )
+        self.sudden: tuple[tuple[Array, Size], ...] = (*blown, *shaken)
+
+        self.afterwards: Afterwards = spec.trajectory.afterwards
+        self.horizon = plan.horizon if self.afterwards == "nothing" else None
+        self.samples = None if self.horizon is None else ceil(self.horizon / self.sample_time)
 
     def nominal(self) -> Nominal:
         """A, B and E as they are written."""
         return Nominal(**{name: HexMatrix(getattr(self, name)) for name in "ABE"})
 
-    # sizes
-
-    @property
-    def states(self) -> int:
-        """n."""
-        return len(self.model.states)
-
-    @property
-    def inputs(self) -> int:
-        """m."""
-        return len(self.model.inputs)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """States, then inputs."""
-        return *self.model.states, *self.model.inputs
-
-    # the machine
-
-    @property
-    def hardware(self) -> Hardware:
-        """The computer and the sensors."""
-        assert self.spec.hardware is not None
-        return self.spec.hardware
-
-    @property
-    def sample_time(self) -> Fraction:
-        """Ts in s."""
-        return self.hardware.sample_time
-
-    @property
-    def whole(self) -> int:
-        """q: whole samples of the delay."""
-        return int(self.hardware.delayed // self.sample_time)
-
-    @property
-    def rest(self) -> Fraction:
-        """tau': the rest of the delay, in [0, Ts)."""
-        return self.hardware.delayed - self.whole * self.sample_time
-
-    @property
-    def hold(self) -> Hold:
-        """What the plan's input is while a command acts."""
-        return self.hardware.hold
-
-    @property
-    def noise(self) -> Size:
-        """Of the measured states."""
-        return Size.of(self.hardware.noise, self.states)
-
-    # what pushes
-
-    @cached_property
-    def gusts(self) -> Size:
-        """Of the disturbance w, (k,)."""
-        wind = self.spec.disturbance
-        return Size(np.zeros(0), length=False) if wind is None else Size.of(wind.bound, self.E.shape[1])
-
-    @property
-    def sways(self) -> bool:
-        """Whether the disturbance has a rate: then it is a component of eta."""
-        return self.spec.disturbance is not None and self.spec.disturbance.rate is not None
-
-    @cached_property
-    def matched(self) -> tuple[int, ...]:
-        """The inputs beside which an h acts that is not identically 0."""
-        h = self.model.h
-        return tuple(j for j in range(self.inputs) if h is None or h[j] != constant(0))
-
-    @cached_property
-    def declared(self) -> Array:
-        """Bounds of |h|, of its slope and of its rate, of an h that is not given otherwise, (3,)."""
-        bounds = self.spec.uncertainty.bounds
-        given = (None,) * 3 if bounds is None else (bounds.h, bounds.h_x, bounds.h_t)
-        return np.array([np.inf if each is None else fraction_bounds(each)[1] for each in given])
-
-    @property
-    def jumps(self) -> bool:
-        """Whether nothing bounds how fast h changes: it is sudden, as a wind through the columns of B."""
-        return self.model.h is None and not np.isfinite(self.declared[1:]).all()
-
-    @cached_property
-    def unknown(self) -> tuple[int, ...]:
-        """The rows of F in which a parameter stands that is not known."""
-        names = {name for name, _ in self.model.parameters}
-        rows = zip(self.drift, self.gained, strict=True)
-        return tuple(i for i, (f, row) in enumerate(rows) if names & set(free_symbols([f, *row])))
-
-    @property
-    def drift(self) -> tuple[Expression, ...]:
-        """f(x, p), (n,)."""
-        return self.model.drift or self.model.f
-
-    @property
-    def gained(self) -> tuple[tuple[Expression, ...], ...]:
-        """B(x, p), (n, m)."""
-        return tuple(map(tuple, self.model.gained or self.model.B))
-
-    @cached_property
-    def field(self) -> tuple[Expression, ...]:
-        """F(x, u, p) = f(x, p) + B(x, p) u, (n,)."""
-        return driven(self.drift, self.gained, self.model.inputs)
-
-    @cached_property
-    def H(self) -> Array:
-        """How eta enters, (n, r): h by columns of B, a disturbance with a rate by those of E, parameters by rows."""
-        own = self.B[:, [] if self.jumps else list(self.matched)]
-        swaying = self.E if self.sways else self.E[:, :0]
-        rows = self.unknown if self.slow else ()
-        return np.hstack([own, swaying, np.eye(self.states)[:, list(rows)]])
-
-    @property
-    def R(self) -> Array:
-        """How rho enters, (n, n + m): as it is, and by columns of B."""
-        return np.hstack([np.eye(self.states), self.B])
-
-    @cached_property
-    def sudden(self) -> tuple[tuple[Array, Size], ...]:
-        """Blocks of what may jump at any time: columns (n, k) and its size."""
-        blocks = []
-        if self.gusts.each.size and not self.sways:
-            blocks.append((self.E, self.gusts))
-        if self.jumps and self.matched:
-            blocks.append((self.B, Size(np.full(self.inputs, self.declared[0]), length=self.inputs > 1)))
-        return tuple(blocks)
-
-    # the plan in time
-
-    @cached_property
-    def horizon(self) -> Fraction | None:
-        """Until when the claim is, in s; None: for ever."""
-        end = self.plan.horizon
-        return None if end is None or self.afterwards != "nothing" else end
-
-    @property
-    def afterwards(self) -> Afterwards:
-        """What holds after the end of a finite plan."""
-        return self.spec.trajectory.afterwards
-
-    @cached_property
-    def samples(self) -> int | None:
-        """Intervals up to the horizon, None for ever."""
-        return None if self.horizon is None else ceil(self.horizon / self.sample_time)
-
-    @cached_property
     def times(self) -> Range | None:
         """The times that matter for h and the plan; None where nothing depends on t.
 

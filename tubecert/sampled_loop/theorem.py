@@ -286,7 +286,7 @@ def _short(loop: Loop, found: Boxes, claimed: Boxes) -> list[Lack]:
 
 def undefined(loop: Loop) -> list[Finding]:
     """What is not proven to be defined on the safe set, or at a time that matters; a plan that does not go on."""
-    return unending(loop.spec, loop.plan.knots) or domain_findings(loop.spec, loop.times, _CAREFUL)
+    return unending(loop.spec, loop.plan.knots) or domain_findings(loop.spec, loop.times(), _CAREFUL)
 
 
 def _domain(loop: Loop, inequalities: Inequalities, boxes: Boxes) -> list[Lack]:
