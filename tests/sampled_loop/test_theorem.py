@@ -508,7 +508,7 @@ def test_a_command_acts_in_its_own_stage():
         ({"disturbance": "{E: [[1]], bound: 0.3, rate: 2}"}, 0.3, 2, 0.3),
         ({"trajectory": WAVE, "system": scalar("(p - 1)*x", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
         ({"trajectory": WAVE, "system": scalar("0", "p", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
-        ({"trajectory": WAVE, "system": scalar("(p - 1)*x**2", more=RANGE), "slow": True}, 0.1, 0.2, 0.1),
+        ({"trajectory": WAVE, "system": scalar("(p - 1)*x**2", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
     ],
 )  # fmt: skip
 def test_sizes_and_rates(sections, size, rate, first):

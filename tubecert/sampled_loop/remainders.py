@@ -7,7 +7,6 @@ Implements: theory of the sampled loop, section 4.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -17,7 +16,7 @@ import numpy as np
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import Expression, derivatives
+from tubecert.expression import derivatives
 from tubecert.expression.matrix import jacobian
 from tubecert.model import TIME
 from tubecert.sampled_loop.cells import cells_of, end_of, in_time, largest_jump, steepness
@@ -121,7 +120,7 @@ class Remainders:
         moved = total(gain, self._of_inputs(size)) + self._shaken(_wider(x, W))
         sudden = np.zeros(loop.states)
         if not loop.slow:
-            sudden[list(loop.unknown)] = self._strangeness
+            sudden[list(loop.unknown)] = self._strangeness[0]
         return np.concatenate(
             [(bent + self.defect + sudden + moved) * SUMMED, (self.held + self._slope(W)) * SUMMED]
         )
@@ -170,7 +169,8 @@ class Remainders:
             each = loop.gusts.each
             parts.append((each, np.full(len(each), fraction_bounds(wind.rate)[1]), each))
         if loop.slow:
-            parts.append((self._strangeness, self._strange_rate, self._strangeness))
+            size, rate = self._strangeness
+            parts.append((size, rate, size))
         return Sizes(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def _uncertainty(self, W: Array) -> tuple[Array, Array, Array]:
@@ -181,8 +181,11 @@ class Remainders:
             speed = float(np.max(lengths(self.speed.magnitude.T)))
             size = np.full(len(own), h)
             return size, np.full(len(own), (fast + steep * speed) * (1 + 1e-15)), size
-        size = self._h_run(self._h, _wider(self._timed.x, W)).magnitude.max(axis=1)[own]
-        return size, self._h_rate[own], self._h_first().magnitude.max(axis=1)[own]
+        size = self._h_run(self._h, _wider(self._timed.x, W)).magnitude.max(axis=1)
+        now = np.zeros(1)
+        x, _ = self.loop.plan.enclose(now, now)
+        first = self._h.run([*(x[:, i] for i in range(x.lo.shape[1])), Interval.exact(now)], (1,))
+        return size[own], self._h_rate[own], first.magnitude[own, 0]
 
     @cached_property
     def _h_rate(self) -> Array:
@@ -198,46 +201,30 @@ class Remainders:
             rows.append(found.magnitude.max())
         return np.array(rows)
 
-    def _h_first(self) -> Interval:
-        """h(0, x*(0)), (m, N)."""
-        plan = self.loop.plan
-        n = self.loop.states
-        if isinstance(plan, Family):
-            x, count = self.cells.x, len(self.cells)
-        else:
-            start = Tape(plan.start, ()).run([], ())
-            x, count = start[None, :], 1
-        now = Interval.exact(np.zeros(count))
-        return self._h.run([*(x[:, i] for i in range(n)), now], (count,))
-
     @cached_property
-    def _strangeness(self) -> Array:
-        """sup |F_i(x*, u*, p) - F_i(x*, u*, p0)| along the plan, (unknown,)."""
-        natural = np.asarray(self._of_strange(self._strange).max(axis=1))
-        if not natural.size:
-            return natural
-        names = [name for name, _ in self.loop.model.parameters]
-        slopes = [self._of_strange(derivatives(self._strange, name)) for name in names]
+    def _strangeness(self) -> tuple[Array, Array]:
+        """sup |F_i(x*, u*, p) - F_i(x*, u*, p0)| along the plan, and of how fast that changes, (unknown,) each.
+
+        It is 0 at p0, as its slopes by x and u are: slopes by p bound them as well.
+        """
+        loop, x, u = self.loop, self.cells.x, self.cells.u
+        if not self._strange:
+            return np.zeros(0), np.zeros(0)
+        rows = [*self._strange, *(e for name in loop.names for e in derivatives(self._strange, name))]
+        slopes = [e for name, _ in loop.model.parameters for e in derivatives(rows, name)]
+        found = self._run(Tape([*rows, *slopes], self._names), x, u).magnitude
         reach = 0.5 * (self._parameters[:, 1] - self._parameters[:, 0]) * (1 + 1e-12)
-        return np.asarray(np.minimum(natural, total(np.stack(slopes, axis=-1), reach).max(axis=1)))
-
-    @cached_property
-    def _strange_rate(self) -> Array:
-        """sup of how fast that changes along the plan, (unknown,)."""
-        if self.steep is None:
-            return np.full(len(self.loop.unknown), np.inf)
-        found = np.zeros(len(self.loop.unknown))
-        speeds = (*self.speed.magnitude.max(axis=1), *self.steep)
-        for name, speed in zip(self.loop.names, speeds, strict=True):
-            slope = self._of_strange(derivatives(self._strange, name)).max(axis=1)
-            found = found + np.where(slope > 0, slope * speed, 0.0)
-        return np.asarray(found * SUMMED)
+        by_slopes = np.moveaxis(found[len(rows) :].reshape(len(reach), len(rows), -1), 0, -1)
+        found = np.minimum(found[: len(rows)], total(by_slopes, reach))
+        steep = np.full(loop.inputs, np.inf) if self.steep is None else self.steep
+        speeds = np.vstack([self.speed.magnitude, np.repeat(steep[:, None], len(x.lo), axis=1)])
+        size, moved = found[: len(loop.unknown)], found[len(loop.unknown) :]
+        with np.errstate(invalid="ignore"):
+            rates = np.where(moved > 0, moved * np.repeat(speeds, len(size), axis=0), 0.0)
+        rate = np.sum(rates.reshape(len(speeds), *size.shape), axis=0) * SUMMED
+        return size.max(axis=1), rate.max(axis=1)
 
     # -- tapes -------------------------------------------------------------------------------------------------------
-
-    def _of_strange(self, expressions: Sequence[Expression]) -> Array:
-        """Their sizes on every cell, (.., N)."""
-        return self._run(Tape(expressions, self._names), self.cells.x, self.cells.u).magnitude
 
     def _run(self, tape: Tape, x: Interval, u: Interval) -> Interval:
         count = len(x.lo)
