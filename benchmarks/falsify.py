@@ -57,9 +57,9 @@ def _row(setting: Setting, loop: Loop, count: int, seed: int) -> None:
     campaign = simulate(setting, [loop], count=count, seed=seed)
     (attack,) = campaign.attacks
     rate = count / (time.perf_counter() - started)
-    assert attack.worst_comparison is not None
-    shares = [_share(attack.comparison), _share(attack.worst_comparison)]
-    left = attack.comparison.left_the_tube
+    assert attack.adversary is not None
+    shares = [_share(attack.random.comparison), _share(attack.adversary.comparison)]
+    left = attack.random.comparison.left_the_tube
     row = f"{setting.spec.name:12} {_words(loop):44} {count:6} {left:6} {shares[0]:>8} {shares[1]:>9} {rate:7.0f}"
     print(row + _notes(attack), flush=True)
 
@@ -71,8 +71,8 @@ def _share(found: object) -> str:
 
 def _notes(attack: Attack) -> str:
     """Broken promises and runs without a result, if there are any."""
-    broken = [item.bound_of for item in attack.comparison.violations]
-    lost = attack.comparison.no_result
+    broken = [item.bound_of for item in attack.random.comparison.violations]
+    lost = attack.random.comparison.no_result
     return (f"  BROKEN: {', '.join(broken)}" if broken else "") + (f"  no result: {lost}" if lost else "")
 
 

@@ -133,9 +133,9 @@ def quick(monkeypatch):
 def test_runs_do_not_depend_on_how_many_there_are_and_how_they_are_grouped(monkeypatch, quick):
     where = setting("flat", duration="2")
     loops = [loop_of(where, "l1", Choice())]
-    whole = campaigns.simulate(where, loops, count=7, seed=5).attacks[0].runs
+    whole = campaigns.simulate(where, loops, count=7, seed=5).attacks[0].random.runs
     monkeypatch.setattr(campaigns, "LANES", 3)
-    parts = campaigns.simulate(where, loops, count=5, seed=5).attacks[0].runs
+    parts = campaigns.simulate(where, loops, count=5, seed=5).attacks[0].random.runs
     close = {"rtol": 0, "atol": 1e-12}  # BLAS sums in another order
     np.testing.assert_allclose(whole.x[:5], parts.x, **close)
     np.testing.assert_allclose(whole.found.peak["distance"][:5], parts.found.peak["distance"], **close)
@@ -147,7 +147,7 @@ def test_processes_find_the_same(monkeypatch, quick):
     where = setting("flat", duration="1")
     loops = [loop_of(where, "l1", Choice())]
     one, two = (
-        campaigns.simulate(where, loops, count=5, seed=5, executor=each).attacks[0].runs
+        campaigns.simulate(where, loops, count=5, seed=5, executor=each).attacks[0].random.runs
         for each in (Serial(), Processes(2))
     )
     np.testing.assert_array_equal(one.x, two.x)

@@ -111,12 +111,12 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
         pair["adaptation_rate"],
     )
     assert loop.promise is not None
-    assert "B distance" in loop.origin
+    assert "B distance" in loop.gains_are
     paper = loop_of(where, "l1", Choice(source="26"))
     assert paper.problem.gains.adaptation_rate == result.to_json()["conditions_26"]["adaptation_rate"]
     chosen = loop_of(where, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000)))
     assert chosen.promise is None
-    assert chosen.origin == CHOSEN
+    assert chosen.gains_are == CHOSEN
     assert loop_of(where, "ccm", Choice()).promise is None
 
 
@@ -166,7 +166,7 @@ def test_a_loop_takes_the_gains_of_the_kind_that_is_asked_for(controller, wanted
     loop = loop_of(where, controller, Choice(source=wanted))
     recipe = where.certified.result.proof.of[name_of(wanted).key]
     assert loop.problem.gains.bandwidth == float(recipe.bandwidth)
-    assert loop.origin == f"certified by {name_of(wanted)}"
+    assert loop.gains_are == f"certified by {name_of(wanted)}"
     assert (loop.promise is None) == (controller == "reference")
 
 

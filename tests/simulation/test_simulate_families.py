@@ -16,7 +16,6 @@ from tubecert.errors import TubecertError
 from tubecert.findings import Severity
 from tubecert.model import build
 from tubecert.pipeline.membership import membership
-from tubecert.records import to_json
 from tubecert.simulation.adaptive.campaign import follow
 from tubecert.simulation.adaptive.families import drawing_of, members_of
 from tubecert.simulation.adaptive.reading import adopted
@@ -118,7 +117,7 @@ def test_the_certified_loop_keeps_to_every_plan():
     assert not loop.comparison.violations
     assert loop.comparison.worst["distance"].bound <= setting.reach
     assert 0 < found.largest_defect <= 0.01
-    data = json.loads(json.dumps(to_json(found)))
+    data = json.loads(json.dumps(found.data))
     assert data["loops"][0]["runs"] == 6
     assert data["largest_defect"] == found.largest_defect
 

@@ -13,7 +13,6 @@ from simulated import FLAT
 from tubecert.letters import name_of
 from tubecert.simulation.adaptive.campaign import simulate
 from tubecert.simulation.adaptive.judge import compare
-from tubecert.simulation.adaptive.record import summary
 from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
@@ -31,9 +30,9 @@ def made(text, kinds="all"):
 
 def of_all(found):
     """The comparisons of a campaign with one loop, which falsified nothing."""
-    assert summary(found, "sha256:0").outcome == "not falsified"
-    (drawn,), (attack,) = found.drawn, found.attacks
-    return drawn.comparison, attack.comparison, attack.worst_comparison
+    assert found.outcome == "not falsified"
+    (drawn,), (attack,) = found.loops, found.attacks
+    return drawn.comparison, attack.random.comparison, attack.adversary.comparison
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +54,7 @@ def test_random_runs_and_an_adversary_stay_within_what_is_proven(limited, letter
             own.plan.least.above == own.plan.greatest.above == 0
         )  # the plan is at rest: u is all of the loop's
         assert use.greatest - use.least > 0.05  # and it does something
-    told = summary(found, "sha256:0").to_json()
+    told = found.summary("sha256:0")
     assert {part["inputs"][0]["input"] for part in told["loops"]} == {"u"}
     assert told["attacks"][0]["random"]["inputs"][0]["proven"] == list(use.proven)
 
@@ -65,7 +64,7 @@ def test_random_runs_and_an_adversary_stay_within_what_is_proven(limited, letter
 def test_a_bound_that_is_too_small_is_broken_by_a_run(limited, end):
     setting, _ = limited
     loop = loop_of(setting, "l1", Choice(source="distance"))
-    runs = simulate(setting, [loop], count=0, seed=0).drawn[0].runs
+    runs = simulate(setting, [loop], count=0, seed=0).loops[0].runs
     fair = compare(setting, runs, loop.promise)
     assert not fair.violations
     (use,) = fair.inputs
@@ -82,7 +81,7 @@ def test_a_bound_that_is_too_small_is_broken_by_a_run(limited, end):
 def test_a_loop_that_is_not_covered_is_told_and_not_compared(limited):
     setting, _ = limited
     loop = loop_of(setting, "ccm", Choice())
-    (drawn,) = simulate(setting, [loop], count=0, seed=0).drawn
+    (drawn,) = simulate(setting, [loop], count=0, seed=0).loops
     (use,) = drawn.comparison.inputs
     assert use.proven is None
     assert use.greatest == drawn.runs.found.greatest.max() >= drawn.runs.u.max()
@@ -93,8 +92,8 @@ def test_without_limits_nothing_is_told():
     setting, _ = made(FLAT, "distance")
     loop = loop_of(setting, "l1", Choice(source="distance"))
     found = simulate(setting, [loop], count=0, seed=0)
-    assert found.drawn[0].comparison.inputs == ()
-    assert all("inputs" not in part for part in summary(found, "sha256:0").to_json()["loops"])
+    assert found.loops[0].comparison.inputs == ()
+    assert all("inputs" not in part for part in found.summary("sha256:0")["loops"])
 
 
 @pytest.mark.slow
@@ -133,7 +132,7 @@ limits: {{v: [-9, 9]}}
         (use,) = comparison.inputs
         assert use.proven == (bound.least, bound.greatest)
         assert bound.least <= use.least <= use.greatest <= bound.greatest
-    runs = found.drawn[0].runs
+    runs = found.loops[0].runs
     planned = runs.u_plan[:, 1]
     assert own.plan.least.below <= planned.min() <= own.plan.least.above + 1e-3
     assert own.plan.greatest.below - 1e-3 <= planned.max() <= own.plan.greatest.above

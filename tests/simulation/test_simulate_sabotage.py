@@ -15,7 +15,6 @@ from tubecert.report.simulation import page_of
 from tubecert.report.terminal import Terminal
 from tubecert.report.text import screen
 from tubecert.simulation.adaptive.campaign import simulate
-from tubecert.simulation.adaptive.record import summary
 from tubecert.simulation.adaptive.setting import Choice, loop_of
 
 SEED = 0
@@ -53,7 +52,7 @@ def metric(own):
 )
 def test_a_lie_is_found_with_seed_run_and_time(name, lie, bound):
     own, loop = lie(setting(name))
-    found = summary(simulate(own, [loop], count=RUNS, seed=SEED), "hash")
+    found = simulate(own, [loop], count=RUNS, seed=SEED)
     assert (found.outcome, found.seed) == ("falsified", SEED)
     random, aimed = (
         part.comparison.violations for part in (found.attacks[0].random, found.attacks[0].adversary)
@@ -65,7 +64,7 @@ def test_a_lie_is_found_with_seed_run_and_time(name, lie, bound):
         screen(page_of(found), [], verbose=True)
     )
     assert re.search(rf"falsified l1, .* t = \S+ s, random run {broken.run}, seed {SEED}\n", told), told
-    again = simulate(own, [loop], count=0, seed=SEED, replay=broken.run).drawn[0].comparison
+    again = simulate(own, [loop], count=0, seed=SEED, replay=broken.run).loops[0].comparison
     same = next(item for item in again.violations if item.bound_of == bound)
     assert same.value == pytest.approx(broken.value, rel=1e-2)
     assert same.t == pytest.approx(broken.t, abs=0.05 * own.horizon)
@@ -74,5 +73,5 @@ def test_a_lie_is_found_with_seed_run_and_time(name, lie, bound):
 @pytest.mark.slow
 def test_the_truth_is_not_falsified():
     own = setting("flat")
-    found = summary(simulate(own, [loop_of(own, "l1", Choice())], count=RUNS, seed=SEED), "hash")
+    found = simulate(own, [loop_of(own, "l1", Choice())], count=RUNS, seed=SEED)
     assert found.outcome == "not falsified"

@@ -13,10 +13,9 @@ from tubecert.expression import exp, symbol
 from tubecert.report.simulation import page_of
 from tubecert.report.terminal import Terminal
 from tubecert.report.text import screen
-from tubecert.simulation.adaptive.campaign import SPECIFIED, Campaign, Drawn, simulate
+from tubecert.simulation.adaptive.campaign import SPECIFIED, Campaign, Followed, simulate
 from tubecert.simulation.adaptive.judge import compare
 from tubecert.simulation.adaptive.loops import Disturbance, LoopProblem
-from tubecert.simulation.adaptive.record import summary
 from tubecert.simulation.adaptive.setting import Choice, loop_of
 from tubecert.trajectory import constant_plan
 
@@ -71,9 +70,8 @@ def thinner(where, factor):
 
 
 def words_of(campaign):
-    data = summary(campaign, "none")
     terminal = Terminal(stream=None, colored=False, width=200, interactive=False)
-    return data.to_json(), terminal.text(screen(page_of(data), [], verbose=False))
+    return campaign.summary("none"), terminal.text(screen(page_of(campaign), [], verbose=False))
 
 
 @pytest.mark.slow
@@ -82,8 +80,8 @@ def test_when_the_tube_is_left_is_told():
     steep = thinner(where, 50)
     drawn = loop_of(steep, "l1", Choice(bandwidth=Fraction(1, 10), adaptation_rate=Fraction(1)))
     found = simulate(steep, [drawn], count=0, seed=0)
-    exit = found.drawn[0].comparison.first_exit
-    runs = found.drawn[0].runs
+    exit = found.loops[0].comparison.first_exit
+    runs = found.loops[0].runs
     outside = (runs.distance[0] > steep.reach) | (np.linalg.norm(runs.x[0], axis=1) > steep.rho)
     assert (exit.run, exit.t) == (0, runs.t[np.argmax(outside)])
     data, words = words_of(found)
@@ -96,8 +94,8 @@ def test_when_the_tube_is_left_is_told():
 def test_a_run_in_the_tube_has_no_exit():
     where = setting("flat")
     found = simulate(where, [loop_of(where, "l1", Choice())], count=0, seed=0)
-    assert found.drawn[0].comparison.first_exit is None
-    assert compare(where, found.drawn[0].runs, None).unresolved == ()
+    assert found.loops[0].comparison.first_exit is None
+    assert compare(where, found.loops[0].runs, None).unresolved == ()
 
 
 @pytest.mark.parametrize(
@@ -119,9 +117,9 @@ def test_what_is_no_result_and_what_is_missing_is_told(error, interrupted, outco
         "unresolved": np.array([2.5 if error > 0.01 else np.nan]),
     }
     made = runs_by_hand(t, still, distance, **doubt)
-    drawn = Drawn(loop=own, runs=made, comparison=compare(where, made, replace(own.promise, decay=None)))
+    drawn = Followed(loop=own, runs=made, comparison=compare(where, made, replace(own.promise, decay=None)))
     kept = {"uncertainty": SPECIFIED, "attacks": (), "seed": 0, "interrupted": interrupted}
-    data, words = words_of(Campaign(setting=where, drawn=(drawn,), **kept))
+    data, words = words_of(Campaign(setting=where, loops=(drawn,), **kept))
     assert data["outcome"] == outcome
     assert data["loops"][0]["no_result"] == (outcome == "no result")
     assert word in words

@@ -87,7 +87,7 @@ def test_a_wind_blows_on_the_loop_of_b_and_breaks_nothing():
     own = loop_of(setting, "l1", Choice())
     assert own.promise.decay.defect > 0.009 * setting.certified["wind_push"] > 0  # the plan has none
     (found,) = simulate(setting, [own], count=15, seed=2).attacks
-    assert found.worst_comparison.worst["distance"].share > 0.1
-    for comparison in (found.comparison, found.worst_comparison):
+    assert found.adversary.comparison.worst["distance"].share > 0.1
+    for comparison in (found.random.comparison, found.adversary.comparison):
         assert not comparison.violations
         assert not comparison.no_result

@@ -151,7 +151,7 @@ def test_random_runs_on_a_cluster_are_those_of_this_machine(cluster, monkeypatch
     where = setting("flat", duration="1")
     loops = [loop_of(where, "l1", Choice())]
     here, there = (
-        campaign.simulate(where, loops, count=7, seed=5, executor=each).attacks[0].runs
+        campaign.simulate(where, loops, count=7, seed=5, executor=each).attacks[0].random.runs
         for each in (Serial(), Cluster(cluster[0]))
     )
     np.testing.assert_array_equal(here.x, there.x)

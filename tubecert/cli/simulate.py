@@ -85,7 +85,6 @@ def run(given: Given, output: Output) -> ExitCode:
     executor = workers_of(jobs, given.scheduler, "--scheduler") or Serial()
     from tubecert.report import simulation as told
     from tubecert.simulation.adaptive.files import write
-    from tubecert.simulation.adaptive.record import summary
     from tubecert.simulation.folder import prepared
 
     require_members(system, wishes, flag)
@@ -96,10 +95,9 @@ def run(given: Given, output: Output) -> ExitCode:
         if report is not None:
             report(Step(phase=Phase.FIGURES))
         files = write(folder, campaign, certificate=certified.hash)
-    data = summary(campaign, certified.hash)
-    page, closing = told.page_of(data), _closing(given, folder, files)
-    present(output, page, closing, _json(data.to_json()) if output.json else None)
-    return _CODES.get(data.outcome, ExitCode.CERTIFIED)
+    page, closing = told.page_of(campaign), _closing(given, folder, files)
+    present(output, page, closing, _json(campaign.summary(certified.hash)) if output.json else None)
+    return _CODES.get(campaign.outcome, ExitCode.CERTIFIED)
 
 
 def _sampled(given: Given, system: Spec, numbers: SimulationNumbers, output: Output) -> ExitCode:

@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tubecert.report.page import Page
-    from tubecert.simulation.adaptive.campaign import Campaign
+    from tubecert.simulation.adaptive.campaign import Campaign, Outcome
     from tubecert.simulation.adaptive.loops import Runs
-    from tubecert.simulation.adaptive.record import Outcome, Summary
 
 
 OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
@@ -37,7 +36,7 @@ class Simulation:
     @property
     def outcome(self) -> Outcome:
         """`not falsified`, `falsified`, `tube left`, `no result`, `interrupted` or `nothing claimed`."""
-        return self._found().outcome
+        return self.campaign.outcome
 
     @property
     def falsified(self) -> bool:
@@ -47,24 +46,19 @@ class Simulation:
     @property
     def summary(self) -> Json:
         """Everything that was found, as plain data."""
-        return self._found().to_json()
-
-    def _found(self) -> Summary:
-        from tubecert.simulation.adaptive.record import summary
-
-        return summary(self.campaign, self.compared_with)
+        return self.campaign.summary(self.compared_with)
 
     @property
     def controllers(self) -> tuple[str, ...]:
         """The loops that were simulated."""
-        return tuple(item.loop.controller for item in self.campaign.drawn)
+        return tuple(item.loop.controller for item in self.campaign.loops)
 
     def run(self, controller: str) -> Runs:
         """The run of a loop under the uncertainty that is drawn: times `t` (K,) in s, `x` (1, K, n), `u` (1, K, m), ...
 
         Raises `KeyError` for a loop that was not simulated.
         """
-        for item in self.campaign.drawn:
+        for item in self.campaign.loops:
             if item.loop.controller == controller:
                 return item.runs
         raise KeyError(controller)
@@ -113,4 +107,4 @@ class Simulation:
     def _page(self) -> Page:
         from tubecert.report.simulation import page_of
 
-        return page_of(self._found())
+        return page_of(self.campaign)

@@ -10,8 +10,9 @@ from tubecert.digits import UNKNOWN, down, short, up
 from tubecert.report.page import Block, Facts, Page, Reason, Section, Table, Words
 
 if TYPE_CHECKING:
+    from tubecert.simulation.adaptive.campaign import Campaign
     from tubecert.simulation.adaptive.judge import Clearance, Comparison, InputUse, RunAt, Stopped, Violation
-    from tubecert.simulation.adaptive.record import LoopData, Summary
+    from tubecert.simulation.adaptive.setting import Loop
 
 CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."
 _FIRST: Final = 2  # of what broke, on the first screen
@@ -31,7 +32,7 @@ _WORDS: Final = {
 class _Part:
     """Runs of a loop: in a word, and what they are about; `each`: what one of many is, which `--replay` may show."""
 
-    loop: LoopData
+    loop: Loop
     comparison: Comparison
     word: str
     what: str
@@ -48,7 +49,7 @@ class _Part:
         return f"{self.each} {item.run}, {self.what}" if self.each else self.what
 
 
-def page_of(data: Summary) -> Page:
+def page_of(data: Campaign) -> Page:
     """The page of a campaign."""
     parts = list(_parts(data))
     sections = (
@@ -57,7 +58,7 @@ def page_of(data: Summary) -> Page:
         if (blocks := tuple(made))
     )
     return Page(
-        name=data.name,
+        name=data.setting.spec.name,
         verdict=data.outcome,
         summary=_because(data, [part.comparison for part in parts if part.loop.tested]),
         meaning=CAVEAT,
@@ -66,7 +67,7 @@ def page_of(data: Summary) -> Page:
     )
 
 
-def _because(data: Summary, tested: list[Comparison]) -> str:
+def _because(data: Campaign, tested: list[Comparison]) -> str:
     """What decided, in a few words."""
     runs = _runs(sum(own.runs for own in tested))
     shares = [own.worst["distance"].share for own in tested if own.worst]
@@ -91,7 +92,7 @@ def _runs(count: int) -> str:
     return "1 run" if count == 1 else f"{count} runs"
 
 
-def _parts(data: Summary) -> Iterator[_Part]:
+def _parts(data: Campaign) -> Iterator[_Part]:
     """Every comparison, with what it is about."""
     seed = f"seed {data.seed}"
     for own in data.loops:
@@ -105,7 +106,7 @@ def _parts(data: Summary) -> Iterator[_Part]:
             word="random",
             what=seed,
             each="random run",
-            asked=random.asked,
+            asked=attack.asked,
         )
         if worst is not None:
             found, what = worst.comparison, f"adversary, {seed}"
@@ -117,7 +118,7 @@ def _parts(data: Summary) -> Iterator[_Part]:
             yield _Part(loop=along.loop, comparison=found, word="other plans", what=what, each=each)
 
 
-def _sections(data: Summary, parts: list[_Part]) -> Iterator[tuple[str, str, Iterator[Block]]]:
+def _sections(data: Campaign, parts: list[_Part]) -> Iterator[tuple[str, str, Iterator[Block]]]:
     broken = [_violation(part, item) for part in parts for item in part.comparison.violations]
     yield "runs", "Runs", _first(data, parts, broken[:_FIRST])
     yield "broken", "Everything that broke", iter(broken[_FIRST:] and broken)
@@ -126,7 +127,7 @@ def _sections(data: Summary, parts: list[_Part]) -> Iterator[tuple[str, str, Ite
     yield "acted", "What acted on the loops", _about(data)
 
 
-def _first(data: Summary, parts: list[_Part], broken: list[Reason]) -> Iterator[Block]:
+def _first(data: Campaign, parts: list[_Part], broken: list[Reason]) -> Iterator[Block]:
     yield from broken
     for part in parts:
         yield from (Words(text=_stopped(part, item)) for item in part.comparison.stopped[:_LISTED])
@@ -135,7 +136,7 @@ def _first(data: Summary, parts: list[_Part], broken: list[Reason]) -> Iterator[
     yield Table.of(columns, map(_row, parts))
     loops = {each.loop.controller: _gains(each.loop) for each in data.loops}
     yield Facts.of(loops.items(), tuple(loops))
-    if data.obstacles.plan:
+    if data.setting.spec.obstacles:
         yield _obstacles(data)
 
 
@@ -180,9 +181,11 @@ def _row(part: _Part) -> tuple[str, ...]:
     )
 
 
-def _obstacles(data: Summary) -> Table:
+def _obstacles(data: Campaign) -> Table:
+    from tubecert.simulation.adaptive.judge import of_plan, of_tube
+
     columns = ("obstacle", "plan", "tube", *(own.loop.controller for own in data.loops))
-    pairs = zip(data.obstacles.plan, data.obstacles.tube, strict=True)
+    pairs = zip(of_plan(data.setting), of_tube(data.setting), strict=True)
     rows = (
         (str(i + 1), *map(_clearance, (plan, tube, *(own.obstacles[i] for own in data.loops))))
         for i, (plan, tube) in enumerate(pairs)
@@ -227,10 +230,10 @@ def _went(own: InputUse) -> tuple[str, str]:
     return f"[{short(own.least)}, {short(own.greatest)}]", stays
 
 
-def _about(data: Summary) -> Iterator[Block]:
+def _about(data: Campaign) -> Iterator[Block]:
     """The uncertainty that is drawn, the class that attacked, and the plans that were drawn."""
-    own = data.bounds
-    yield Words(text=f"one: the uncertainty {data.uncertainty}, 0 <= t <= {short(data.horizon)} s.")
+    own = data.setting.uncertainty
+    yield Words(text=f"one: the uncertainty {data.uncertainty}, 0 <= t <= {short(data.setting.horizon)} s.")
     yield Words(
         text=f"random, adversary: |h| <= {short(own.h)}, |dh/dx| <= {short(own.h_x)}, |dh/dt| <= {short(own.h_t)}, "
         f"|h| <= {short(own.h_initial)} at the start; seed {data.seed}."
@@ -244,7 +247,7 @@ def _about(data: Summary) -> Iterator[Block]:
         )
 
 
-def _gains(loop: LoopData) -> str:
+def _gains(loop: Loop) -> str:
     """What a loop adapts with, and what certifies it."""
     gains = loop.gains
     if gains is None:

@@ -1,7 +1,8 @@
 """All that one command simulates: every loop under the uncertainty that is drawn, then attacks on the loops that adapt.
 
 Loops and random runs are one vector of lanes, or several where there are many. Interruption keeps what is finished;
-`interrupted` says that something is missing.
+`interrupted` says that something is missing. The words are chosen with care: a simulation that finds nothing has not
+falsified anything, and that is all.
 """
 
 from __future__ import annotations
@@ -11,22 +12,31 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from tubecert.executor import Executor, Serial
 from tubecert.progress import Phase, Progress, Step
+from tubecert.records import Json, to_json
 from tubecert.simulation.adaptive.attack import Cases, cases, worst
 from tubecert.simulation.adaptive.engine import integrate
-from tubecert.simulation.adaptive.judge import Comparison, check_class, compare
+from tubecert.simulation.adaptive.judge import (
+    Clearance,
+    Comparison,
+    check_class,
+    compare,
+    of_plan,
+    of_run,
+    of_tube,
+)
 from tubecert.simulation.adaptive.loops import Batch, Disturbance, Runs, joined
-from tubecert.simulation.adaptive.record import FollowedData, LoopData, MembersData
 from tubecert.simulation.adaptive.setting import Loop, Setting
 from tubecert.simulation.adaptive.uncertainty import usual
 from tubecert.simulation.vectors import finished, vectors_of
 from tubecert.trajectory import Plan
 
+FORMAT: Final = "tubecert-simulation/1"
 LANES: Final = 128  # random runs of a vector: they are kept, and told of, when all of them are finished
 _FIRST: Final = 8  # of the first vector: who interrupts soon has these, and the loops that are drawn
 _KEPT: Final = ("x", "off", "distance")  # of random runs, at the output times
@@ -34,37 +44,69 @@ PLANS: Final = 25  # random plans whose runs are one vector
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
 _HERE: Final = Serial()
+_WAVES: Final = ("amplitude", "frequency", "wave", "phase", "push")
+Outcome = Literal["falsified", "tube left", "no result", "interrupted", "not falsified", "nothing claimed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Drawn:
-    """One run of a loop that is drawn, and its comparison."""
+class Followed:
+    """Runs of a loop, and what they came to.
 
-    loop: Loop
-    runs: Runs
-    comparison: Comparison
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Attack:
-    """What random runs, of which so many were `asked` for, and the adversary found against a loop.
-
-    The adversary's run is alone in `worst` and `case`.
+    Of one that is drawn how near it came to `obstacles`; of an adversary the `case`: its start, and what acted on it.
     """
 
     loop: Loop
     runs: Runs
-    asked: int
     comparison: Comparison
-    worst: Runs | None = None
+    obstacles: tuple[Clearance, ...] = ()
     case: Cases | None = None
-    worst_comparison: Comparison | None = None
+
+    @classmethod
+    def judged(cls, setting: Setting, loop: Loop, runs: Runs, case: Cases | None = None) -> Followed:
+        """Runs beside what is promised of their loop."""
+        return cls(loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise), case=case)
+
+    @property
+    def data(self) -> dict[str, Json]:
+        """The loop and its comparison."""
+        return {**self.loop.data, **to_json(self.comparison)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Attack:
+    """What random runs, of which so many were `asked` for, and the adversary found against a loop."""
+
+    random: Followed
+    asked: int
+    adversary: Followed | None = None
+
+    @property
+    def loop(self) -> Loop:
+        """The loop."""
+        return self.random.loop
 
     @property
     def greatest(self) -> float | None:
         """The largest d(x*, x) that was met, if a run is a result."""
-        found = [c.worst["distance"].value for c in (self.comparison, self.worst_comparison) if c and c.worst]
-        return max(found, default=None)
+        found = [own.comparison.worst.get("distance") for own in (self.random, self.adversary) if own]
+        return max((use.value for use in found if use), default=None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Members:
+    """Further random plans of a family: run i is along plan i // `runs_each`; the largest defect is a sampled one."""
+
+    asked: int
+    plans: int
+    runs_each: int
+    largest_defect: float
+    loops: tuple[Followed, ...]
+
+    @property
+    def data(self) -> dict[str, Json]:
+        """As it is told."""
+        told = {name: getattr(self, name) for name in ("asked", "plans", "runs_each", "largest_defect")}
+        return told | {"loops": [item.data for item in self.loops]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,11 +115,68 @@ class Campaign:
 
     setting: Setting
     uncertainty: str
-    drawn: tuple[Drawn, ...]
+    loops: tuple[Followed, ...]
     attacks: tuple[Attack, ...]
     seed: int
     interrupted: bool
-    members: MembersData | None = None
+    members: Members | None = None
+
+    @property
+    def outcome(self) -> Outcome:
+        """What all runs came to; a loop that is not meant to stay in the tube has no say but by a broken promise."""
+        found = [*self.loops, *(self.members.loops if self.members else ())]
+        found += [own for attack in self.attacks for own in (attack.random, attack.adversary) if own]
+        tested = [own.comparison for own in found if own.loop.tested]
+        if any(own.comparison.violations for own in found):
+            return "falsified"
+        if any(own.left_the_tube for own in tested):
+            return "tube left"
+        if any(own.no_result for own in tested):
+            return "no result"
+        if self.interrupted:
+            return "interrupted"
+        return "not falsified" if any(own.loop.covered for own in found) else "nothing claimed"
+
+    def summary(self, certificate: str) -> Json:
+        """What `summary.json` holds; `certificate` is the hash of the one that was compared with."""
+        own = self.setting
+        bounds = {name: getattr(own.uncertainty, name) for name in ("h", "h_x", "h_t", "h_initial")}
+        return {
+            "format": FORMAT,
+            "name": own.spec.name,
+            "outcome": self.outcome,
+            "certificate": certificate,
+            "horizon": own.horizon,
+            "rho": own.rho,
+            "dbar": own.reach,
+            "uncertainty": self.uncertainty,
+            "class": bounds,
+            "seed": self.seed,
+            "loops": [item.data | {"obstacles": to_json(item.obstacles)} for item in self.loops],
+            "attacks": [_attack_data(item, own) for item in self.attacks],
+            "obstacles": {"plan": to_json(of_plan(own)), "tube": to_json(of_tube(own))},
+            **({} if self.members is None else {"members": self.members.data}),
+        }
+
+
+def _attack_data(attack: Attack, setting: Setting) -> dict[str, Json]:
+    """Random runs and the adversary of a loop; h of the latter is a wave in x and t (`loops.Disturbance`)."""
+    found, most = attack.adversary, attack.greatest
+    data = attack.loop.data | {
+        "largest_distance_over_dbar": None if most is None else most / setting.reach,
+        "random": {"asked": attack.asked, **to_json(attack.random.comparison)},
+    }
+    if found is not None and found.case is not None:
+        start, h = found.case
+        data["adversary"] = {
+            **to_json(found.comparison),
+            "start": start[0].tolist(),
+            "h": {name: getattr(h, name)[0].tolist() for name in _WAVES},
+        }
+        if setting.uncertainty.sources:
+            beside = h.beside._asdict().items()
+            data["adversary"]["beside"] = {name: part[0].tolist() for name, part in beside}
+    return data
 
 
 def simulate(
@@ -104,10 +203,7 @@ def simulate(
     work = partial(_vector, setting, loops, own, seed)
     found = finished(work, vectors, executor, report, "loops and random runs")
     parts, complete = [runs[len(runs) - len(tested) :] for runs in found], len(found) == len(vectors)
-    drawn = [
-        Drawn(loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise))
-        for loop, runs in zip(loops, found[0], strict=False)
-    ]
+    drawn = [Followed.judged(setting, loop, runs) for loop, runs in zip(loops, found[0], strict=False)]
     if setting.h is not None and replay is None:
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
@@ -115,16 +211,16 @@ def simulate(
     lost = [item.loop for item in drawn if item.comparison.no_result]
     attacks = []
     for loop, *sample in zip(tested, *parts, strict=True):
-        runs = joined(sample)
-        attack = Attack(loop=loop, runs=runs, asked=count, comparison=compare(setting, runs, loop.promise))
+        attack = Attack(random=Followed.judged(setting, loop, joined(sample)), asked=count)
         if complete and loop not in lost:
-            attack = _attacked(setting, attack, seed, report)
-            complete = attack.worst is not None
+            with suppress(KeyboardInterrupt):
+                attack = replace(attack, adversary=_adversary(setting, attack.random, seed, report))
+            complete = attack.adversary is not None
         attacks.append(attack)
     return Campaign(
         setting=setting,
         uncertainty=SPECIFIED if replay is None else RANDOM.format(run=replay, seed=seed),
-        drawn=tuple(drawn),
+        loops=tuple(replace(item, obstacles=of_run(setting, item.runs)) for item in drawn),
         attacks=tuple(attacks),
         seed=seed,
         interrupted=not complete,
@@ -148,15 +244,11 @@ def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numb
     return [*found[: len(drawn)], *(runs.with_only(_KEPT) for runs in found[len(drawn) :])]
 
 
-def _attacked(setting: Setting, attack: Attack, seed: int, report: Progress | None) -> Attack:
-    """With the adversary's run, if nobody interrupts."""
-    try:
-        found = worst(setting, attack.loop, seed, attack.runs, report)
-        (runs,) = integrate([found.of(attack.loop.problem)], tolerance=setting.tolerance)
-    except KeyboardInterrupt:
-        return attack
-    measured = compare(setting, runs, attack.loop.promise)
-    return replace(attack, worst=runs, case=found, worst_comparison=measured)
+def _adversary(setting: Setting, random: Followed, seed: int, report: Progress | None) -> Followed:
+    """The worst run that a search finds."""
+    found = worst(setting, random.loop, seed, random.runs, report)
+    (runs,) = integrate([found.of(random.loop.problem)], tolerance=setting.tolerance)
+    return Followed.judged(setting, random.loop, runs, found)
 
 
 def follow(
@@ -168,7 +260,7 @@ def follow(
     each: int,
     seed: int,
     report: Progress | None = None,
-) -> MembersData | None:
+) -> Members | None:
     """Every loop that adapts along `asked` plans with their defects, `each` runs along each of them.
 
     Of an interruption what is finished is kept; None if nothing is.
@@ -184,15 +276,13 @@ def follow(
             defects += [defect for _, defect in part]
     if not found:
         return None
-    every = [joined(parts) for parts in zip(*found, strict=True)]
-    return MembersData(
+    return Members(
         asked=asked,
         plans=len(defects),
         runs_each=each,
         largest_defect=max(defects),
         loops=tuple(
-            FollowedData(loop=LoopData.of(loop), comparison=compare(setting, runs, loop.promise))
-            for loop, runs in zip(tested, every, strict=True)
+            Followed.judged(setting, loop, joined(parts)) for loop, *parts in zip(tested, *found, strict=True)
         ),
     )
 

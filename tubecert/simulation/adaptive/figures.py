@@ -36,22 +36,22 @@ def figures(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
 
 def _states(campaign: Campaign) -> Figure:
     """Every state over time, in the tube's half-widths, with the radius that is certified in the long run."""
-    setting, first = campaign.setting, campaign.drawn[0].runs
+    setting, first = campaign.setting, campaign.loops[0].runs
     names = setting.spec.states
     figure = blank(7.0, 0.9 + 1.7 * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    promises = [item.loop.promise for item in campaign.drawn if item.loop.promise is not None]
+    promises = [item.loop.promise for item in campaign.loops if item.loop.promise is not None]
     ultimate = min((own.ultimate for own in promises if own.ultimate is not None), default=None)
     plain = np.array_equal(setting.S, np.eye(len(names)))
     for i, (axis, name, width) in enumerate(zip(axes, names, setting.half_widths, strict=True)):
-        plan, curves = first.x_plan[:, i], [item.runs.x[0, :, i] for item in campaign.drawn]
+        plan, curves = first.x_plan[:, i], [item.runs.x[0, :, i] for item in campaign.loops]
         axis.fill_between(first.t, plan - width, plan + width, color=TUBE, alpha=0.25, lw=0, label="tube")
         # |x_i - x_i*| <= sup sqrt(W_ii) d, as the half-widths, where they are what bounds the tube
         rest = None if ultimate is None else ultimate if plain else ultimate / setting.rho * width
         if rest is not None and rest < width:
             for sign, label in ((-1, None), (1, "in the long run")):
                 axis.plot(first.t, plan + sign * rest, color=TUBE, lw=1.0, ls=(0, (5, 2)), label=label)
-        for item, curve in zip(campaign.drawn, curves, strict=True):
+        for item, curve in zip(campaign.loops, curves, strict=True):
             _draw(axis, item.loop, item.runs.t, curve)
         axis.plot(first.t, plan, color="black", lw=1.0, ls="--", label="plan")
         axis.set_ylim(*_window(np.array([plan.min() - width, plan.max() + width]), curves, 1.5))
@@ -71,13 +71,13 @@ def _plane(campaign: Campaign) -> Figure | None:
     section = _section(setting, i, j)
     shapes = [section + point for point in _spread(plan)]
     figure, axis = plane_of(setting.spec, names, shapes, plan)
-    for item in campaign.drawn:
+    for item in campaign.loops:
         _draw(axis, item.loop, item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4)
     for end, marker in ((0, "o"), (-1, "s")):
         axis.plot(*plan[end], marker=marker, ms=4, color="black", ls="none", zorder=6)
     tube = np.vstack(shapes)
-    axis.set_xlim(*_window(tube[:, 0], [item.runs.x[0, :, i] for item in campaign.drawn], 0.5))
-    axis.set_ylim(*_window(tube[:, 1], [item.runs.x[0, :, j] for item in campaign.drawn], 0.5))
+    axis.set_xlim(*_window(tube[:, 0], [item.runs.x[0, :, i] for item in campaign.loops], 0.5))
+    axis.set_ylim(*_window(tube[:, 1], [item.runs.x[0, :, j] for item in campaign.loops], 0.5))
     axis.set_aspect("equal")
     titled(figure, axis, _title(campaign), 5)
     return figure
@@ -85,12 +85,12 @@ def _plane(campaign: Campaign) -> Figure | None:
 
 def _inputs(campaign: Campaign) -> Figure:
     """What acts, u = u* + k + u_a, for every input and loop, with limits and proven ranges."""
-    setting, first = campaign.setting, campaign.drawn[0].runs
+    setting, first = campaign.setting, campaign.loops[0].runs
     limits = dict(setting.spec.limits)
     figure = blank(7.0, 0.9 + 2.0 * len(setting.spec.inputs))
     axes = figure.subplots(len(setting.spec.inputs), 1, sharex=True, squeeze=False)[:, 0]
     for i, (axis, name) in enumerate(zip(axes, setting.spec.inputs, strict=True)):
-        for item in campaign.drawn:
+        for item in campaign.loops:
             _draw(axis, item.loop, item.runs.t, item.runs.u[0, :, i])
             stays = item.loop.promise.ranges.get(name) if item.loop.promise else None
             for end, label in ((stays.least, "certified range"), (stays.greatest, None)) if stays else ():
@@ -108,7 +108,7 @@ def _tube_use(campaign: Campaign) -> Figure:
     figure = blank(7.0, 3.4)
     axis = figure.subplots()
     most = 1.0
-    for item in campaign.drawn:
+    for item in campaign.loops:
         share = item.runs.distance[0] / reach
         most = max(most, float(np.nanmax(share)))
         _draw(axis, item.loop, item.runs.t, share)
@@ -116,9 +116,10 @@ def _tube_use(campaign: Campaign) -> Figure:
             bound = item.loop.promise.decay(item.runs.t) / reach
             _draw(axis, item.loop, item.runs.t, bound, "certified D(t), ", lw=1.0, ls=":")
     for attack in campaign.attacks:
-        if attack.worst is not None:
-            share = attack.worst.distance[0] / reach
-            _draw(axis, attack.loop, attack.worst.t, share, "worst adversary, ", lw=1.0, alpha=0.5)
+        if attack.adversary is not None:
+            worst = attack.adversary.runs
+            share = worst.distance[0] / reach
+            _draw(axis, attack.loop, worst.t, share, "worst adversary, ", lw=1.0, alpha=0.5)
     axis.axhspan(0, 1, color=TUBE, alpha=0.18, lw=0)
     axis.axhline(1, color=TUBE, lw=1.0)
     axis.set_ylim(0, min(1.06 * most, _FARTHEST))
@@ -135,7 +136,7 @@ def _monte_carlo(campaign: Campaign) -> Figure | None:
     figure = blank(7.0, 0.8 + 2.8 * len(attacks))
     axes = figure.subplots(len(attacks), 1, sharex=True, squeeze=False)[:, 0]
     for axis, attack in zip(axes, attacks, strict=True):
-        color, runs = COLORS[attack.loop.controller], attack.runs
+        color, runs = COLORS[attack.loop.controller], attack.random.runs
         share = runs.distance / reach
         alive = ~np.isnan(share).all(axis=0)
         t, share = runs.t[alive], share[:, alive]
@@ -143,9 +144,9 @@ def _monte_carlo(campaign: Campaign) -> Figure | None:
         axis.fill_between(t, low, high, color=color, alpha=0.18, lw=0, label="all runs")
         axis.fill_between(t, q25, q75, color=color, alpha=0.35, lw=0, label="middle half")
         axis.plot(t, median, color=color, label="median")
-        if attack.worst is not None:
-            worst = attack.worst.distance[0] / reach
-            axis.plot(attack.worst.t, worst, color="black", lw=1.0, label="worst adversary")
+        if attack.adversary is not None:
+            worst = attack.adversary.runs
+            axis.plot(worst.t, worst.distance[0] / reach, color="black", lw=1.0, label="worst adversary")
         if attack.loop.promise is not None and attack.loop.promise.decay is not None:
             bound = attack.loop.promise.decay(t) / reach
             axis.plot(t, bound, color=TUBE, lw=1.4, ls="--", label="certified D(t)")

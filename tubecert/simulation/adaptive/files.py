@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.campaign import Campaign
 from tubecert.simulation.adaptive.loops import Runs
-from tubecert.simulation.adaptive.record import summary
 from tubecert.simulation.folder import npz, written_to
 
 
@@ -18,7 +17,7 @@ def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
     """
     from tubecert.simulation.adaptive.figures import DRAWERS
 
-    data, outdated = summary(campaign, certificate).to_json(), [f"{name}.png" for name in DRAWERS]
+    data, outdated = campaign.summary(certificate), [f"{name}.png" for name in DRAWERS]
     return written_to(folder, data, _files(campaign), outdated)
 
 
@@ -32,12 +31,12 @@ def _files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
 
 def _arrays(campaign: Campaign) -> Iterator[tuple[str, Array]]:
     """Everything that was drawn and sampled, by `<controller>_<what>`; of random runs their peaks, too."""
-    for item in campaign.drawn:
+    for item in campaign.loops:
         yield from _named(item.loop.controller, item.runs)
     for attack in campaign.attacks:
-        if attack.worst is not None:
-            yield from _named(f"{attack.loop.controller}_adversary", attack.worst)
-        prefix, runs = f"{attack.loop.controller}_sample", attack.runs
+        if attack.adversary is not None:
+            yield from _named(f"{attack.loop.controller}_adversary", attack.adversary.runs)
+        prefix, runs = f"{attack.loop.controller}_sample", attack.random.runs
         yield from ((f"{prefix}_{name}", getattr(runs, name)) for name in ("t", "distance", "x", "error"))
         yield f"{prefix}_start", runs.x[:, 0]
         yield from ((f"{prefix}_largest_{name}", peak) for name, peak in runs.found.peak.items())

@@ -21,6 +21,7 @@ from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.findings import Finding
 from tubecert.kinds import DISTANCE, name_of
 from tubecert.model import ControlAffineModel, build
+from tubecert.records import Json, to_json
 from tubecert.simulation.adaptive.loops import Controller, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.reading import Certified, Promise, certified_plan, promise
 from tubecert.simulation.adaptive.times import output_times
@@ -201,10 +202,10 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Loop:
-    """A closed loop: the problem, where its gains come from, and the promise about it, if there is one."""
+    """A closed loop: the problem, what its gains are, and the promise about it, if there is one."""
 
     problem: LoopProblem
-    origin: str
+    gains_are: str
     promise: Promise | None
 
     def along(self, plan: Plan) -> Loop:
@@ -220,6 +221,23 @@ class Loop:
     def tested(self) -> bool:
         """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
         return self.problem.adapts
+
+    @property
+    def covered(self) -> bool:
+        """Whether a certificate is about it."""
+        return self.promise is not None
+
+    @property
+    def gains(self) -> LoopGains | None:
+        """Its gains, if it filters."""
+        return self.problem.gains
+
+    @property
+    def data(self) -> dict[str, Json]:
+        """What is told of it."""
+        told = {"controller": self.controller, "gains_are": self.gains_are}
+        gains = {} if self.gains is None else {"gains": to_json(self.gains)}
+        return told | {"covered": self.covered, "tested": self.tested} | gains
 
 
 def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
@@ -245,7 +263,7 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
     gains, covered = _gains(setting, problem, choice) if problem.filters else (None, False)
     return Loop(
         problem=replace(problem, gains=gains),
-        origin="no adaptation" if gains is None else f"certified by {kind}" if covered else CHOSEN,
+        gains_are="no adaptation" if gains is None else f"certified by {kind}" if covered else CHOSEN,
         promise=promise(own, kind) if covered and problem.adapts else None,
     )
 
