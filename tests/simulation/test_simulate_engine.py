@@ -13,7 +13,7 @@ from systems import plain_model
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulation.adaptive.engine import _Lanes, integrate
-from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopGains, LoopProblem, nothing_beside
+from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopGains, LoopProblem
 from tubecert.simulation.lanes import follow
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
@@ -145,7 +145,7 @@ def test_a_wind_moves_the_state_and_not_what_is_predicted(controller, radius):
     expected = dop853(rate, z0, case.times, max_step=1e-3)
     h = Disturbance.from_expressions(wavy_h(), TWO, 1, k=1)
     blowing = {"wind": 1.0, "blowing": [1.0], "gusting": [2.0, 0.4]}
-    h = replace(h, beside=h.beside._replace(**{name: np.array([value]) for name, value in blowing.items()}))
+    h = h._replace(**{name: np.array([value]).T for name, value in blowing.items()})
     found = alone(case, START, h, tolerance=1e-5)
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     if controller == "l1":
@@ -165,9 +165,9 @@ def test_a_wind_that_aims(aim):
         return f(t, z) + E @ w / np.sqrt(w @ w + (0.05 * 2.0) ** 2) * 0.5
 
     case = problem("ccm", E=tuple(tuple(constant(Fraction(repr(float(e)))) for e in row) for row in E))
-    h = replace(Disturbance.from_expressions(wavy_h(), TWO, 1, k=2), layer=2.0)
+    h = Disturbance.from_expressions(wavy_h(), TWO, 1, k=2)._replace(layer=np.array([2.0]))
     blowing = {"wind": 0.5, "aim": float(aim), "gusting": [0.0, np.pi / 2]}
-    h = replace(h, beside=h.beside._replace(**{name: np.array([value]) for name, value in blowing.items()}))
+    h = h._replace(**{name: np.array([value]).T for name, value in blowing.items()})
     found = alone(case, START, h, tolerance=1e-5)
     assert np.abs(found.x[0] - dop853(rate, START[0], case.times)).max() <= found.error[0] <= 5e-5
 
@@ -278,16 +278,13 @@ def test_lanes_do_not_know_each_other():
     rng, N, n, m = np.random.default_rng(1), 40, 2, 1
     starts = rng.uniform(-0.3, 0.3, (N, n))
     starts[7] = [1e5, 1e5]
-    d = Disturbance(
-        base=None,
-        amplitude=rng.normal(size=(N, 2, m)),
-        frequency=rng.uniform(0, 5, (N, 2)),
-        wave=rng.normal(size=(N, 2, n)),
-        phase=rng.uniform(0, 6, (N, 2)),
+    d = Disturbance.from_expressions(None, UNSTABLE, N)._replace(
+        amplitude=rng.normal(size=(2, m, N)),
+        frequency=rng.uniform(0, 5, (2, N)),
+        wave=rng.normal(size=(2, n, N)),
+        phase=rng.uniform(0, 6, (2, N)),
         push=rng.uniform(0, 0.5, N),
         radius=np.full(N, 1.5),
-        centre=np.array([0.1, 0.2]),
-        beside=nothing_beside(N),
     )
     d.push[7] = 0.0
     gains = LoopGains(bandwidth=20.0, projection_radius=3.0, predictor_gain=2.0, adaptation_rate=1e4)
@@ -314,17 +311,15 @@ UNSTABLE = replace(
 @pytest.mark.slow
 def test_disturbances_are_what_they_say():
     """h at the output times, recomputed from its parts."""
-    d = Disturbance(
-        base=(X * Fraction(1, 2),),
-        amplitude=np.array([[[0.3], [0.2]]]),
-        frequency=np.array([[1.0, 3.0]]),
-        wave=np.array([[[0.5, 0.0], [0.0, -1.0]]]),
-        phase=np.array([[0.1, 0.7]]),
-        push=np.array([0.4]),
-        radius=np.array([0.6]),
-        centre=np.array([0.1, -0.2]),
-        beside=nothing_beside(1),
-        layer=0.05,
+    waves = {
+        "amplitude": np.array([[[0.3]], [[0.2]]]),
+        "frequency": np.array([[1.0], [3.0]]),
+        "wave": np.array([[[0.5], [0.0]], [[0.0], [-1.0]]]),
+        "phase": np.array([[0.1], [0.7]]),
+    }
+    others = {"push": 0.4, "radius": 0.6, "layer": 0.05}
+    d = Disturbance.from_expressions((X * Fraction(1, 2),), TWO, 1)._replace(
+        **waves, **{name: np.array([value]) for name, value in others.items()}
     )
     case = problem("ccm", K=9)
     found = alone(case, START, d, tolerance=1e-6)
@@ -332,9 +327,8 @@ def test_disturbances_are_what_they_say():
     clipped = 0
     for t, x, h in zip(found.t, found.x[0], found.h[0], strict=True):
         c = B2[:, 0] @ M @ x
-        shifted = x - d.centre
-        value = 0.5 * x[0] + 0.3 * np.sin(t + 0.5 * shifted[0] + 0.1)
-        value += 0.2 * np.sin(3 * t - shifted[1] + 0.7) + 0.4 * c / np.sqrt(c * c + 0.05**2)
+        value = 0.5 * x[0] + 0.3 * np.sin(t + 0.5 * x[0] + 0.1)
+        value += 0.2 * np.sin(3 * t - x[1] + 0.7) + 0.4 * c / np.sqrt(c * c + 0.05**2)
         clipped += abs(value) > 0.6
         assert h[0] == pytest.approx(np.clip(value, -0.6, 0.6), abs=1e-12)
     assert 0 < clipped < 9

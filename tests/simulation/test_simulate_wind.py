@@ -42,8 +42,8 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
     problem = replace(loop("none").problem, times=np.linspace(0, 2, 5), horizon=2.0)
     model = setting.model
     still = Disturbance.from_expressions(None, model, 1, 1)
-    theta = np.array([[0.31, 0.02]])
-    moved = replace(still, beside=still.beside._replace(theta=theta))
+    theta = np.array([[0.31], [0.02]])
+    moved = still._replace(theta=theta)
     x0 = np.array([[0.05, 0.0]])
     found = alone(problem, x0, moved, tolerance=1e-5)
     M = np.linalg.inv(np.array([[1, -0.3], [-0.3, 2]]))
@@ -74,7 +74,7 @@ def test_no_bound_is_exceeded_by_adversaries_whose_parameters_differ():
     assert not found.violations
     assert not found.left_the_tube
     assert not found.no_result
-    thetas = drawn.h.beside.theta
+    thetas = drawn.h.theta.T
     assert thetas.shape == (60, 2)
     assert np.all((thetas >= [0.28, -0.02]) & (thetas <= [0.32, 0.02]))
     assert len(np.unique(thetas[:, 0])) > 3

@@ -76,7 +76,7 @@ def plant(model: ControlAffineModel, base: tuple[Expression, ...] | None, E: Mat
 
 
 class Acting:
-    """The disturbances of lanes, one after the other (`problem.Disturbance`); the centre is taken into the phases."""
+    """The disturbances of lanes, one after the other."""
 
     def __init__(
         self, parts: Sequence[Disturbance], model: ControlAffineModel, E: Matrix, rest: Matrix
@@ -85,23 +85,16 @@ class Acting:
         if len(bases) > 1:
             raise ValueError("lanes of one vector have one base of h")
         self._plant = plant(model, next(iter(bases), None), E, rest)
-        sizes = [part.lanes for part in parts]
-        self._based = np.repeat([part.base is not None for part in parts], sizes).astype(float)
-        self._amplitude = _joined([part.amplitude for part in parts])  # (W, m, N)
-        self._wave = _joined([part.wave for part in parts])  # (W, n, N)
-        self._frequency = _joined([part.frequency for part in parts])  # (W, N)
-        self._phase = _joined([part.phase - part.wave @ part.centre for part in parts])
-        self._push = np.concatenate([part.push for part in parts])
-        self._pushes = bool(self._push.any())
-        self._radius = np.concatenate([part.radius for part in parts])
-        self._layer = np.repeat([part.layer for part in parts], sizes)
-        beside = zip(*(part.beside for part in parts), strict=True)
-        self._wind, self._aim, self._blowing, self._gusting, self._theta = (
-            _joined(list(own)) for own in beside
+        sizes = [len(part.push) for part in parts]
+        self._based = np.repeat([float(part.base is not None) for part in parts], sizes)
+        self._own = Disturbance(
+            None, *(_joined(list(each)) for each in zip(*(own[1:] for own in parts), strict=True))
         )
-        self._unknown = np.repeat([float(part.beside.theta.shape[1] > 0) for part in parts], sizes)
-        if not len(self._theta):
-            self._theta = np.zeros((len(model.parameters), len(self._push)))
+        self._pushes, self._blows = bool(self._own.push.any()), bool(self._own.wind.any())
+        self._unknown = np.repeat([float(len(part.theta) > 0) for part in parts], sizes)
+        self._theta = (
+            self._own.theta if len(self._own.theta) else np.zeros((len(model.parameters), sum(sizes)))
+        )
 
     def terms(self, t: float, x: Array) -> Terms:
         """The plant's terms, with the lanes' parameters."""
@@ -113,33 +106,30 @@ class Acting:
 
     def h(self, t: float, x: Array, base: Array, push: Array) -> Array:
         """h (m, N) at x (n, N), where `push` (m, N) is B'M gamma_s."""
-        h = base * self._based
-        if len(self._phase):
-            angle = self._frequency * t + np.einsum("win,in->wn", self._wave, x) + self._phase
-            h += np.einsum("wjn,wn->jn", self._amplitude, np.sin(angle))
+        h, own = base * self._based, self._own
+        if len(own.phase):
+            angle = own.frequency * t + np.einsum("win,in->wn", own.wave, x) + own.phase
+            h += np.einsum("wjn,wn->jn", own.amplitude, np.sin(angle))
         if self._pushes:
-            h += self._push / np.sqrt(np.einsum("jn,jn->n", push, push) + self._layer**2) * push
+            h += own.push / np.sqrt(np.einsum("jn,jn->n", push, push) + own.layer**2) * push
         size = np.sqrt(np.einsum("jn,jn->n", h, h))
-        return np.asarray(h * np.minimum(1.0, self._radius / np.maximum(size, _NOTHING)))
+        return np.asarray(h * np.minimum(1.0, own.radius / np.maximum(size, _NOTHING)))
 
     def wind(self, t: float, terms: Terms, pushes: tuple[Array, Array]) -> Array:
         """E w and what unknown parameters do, (n, N); `pushes`: M gamma_s and B B'M gamma_s."""
-        found = terms.rest * self._unknown if len(terms.rest) else np.zeros_like(terms.f)
-        if not self._wind.any():
+        found, own = terms.rest * self._unknown if len(terms.rest) else np.zeros_like(terms.f), self._own
+        if not self._blows:
             return found
         aims = [(terms.E * way[:, None]).sum(axis=0) for way in pushes]
-        w = np.where(self._aim == 0, self._blowing, np.where(self._aim == 1, *aims))
-        square = np.where(self._aim > 0, (_THIN * self._layer) ** 2, 0.0) + (w**2).sum(axis=0)
-        wave = np.clip(_STEEP * np.sin(self._gusting[0] * t + self._gusting[1]), -1.0, 1.0)
-        share = np.where(square > 0, self._wind * wave / np.sqrt(square), 0.0)
+        w = np.where(own.aim == 0, own.blowing, np.where(own.aim == 1, *aims))
+        square = np.where(own.aim > 0, (_THIN * own.layer) ** 2, 0.0) + (w**2).sum(axis=0)
+        wave = np.clip(_STEEP * np.sin(own.gusting[0] * t + own.gusting[1]), -1.0, 1.0)
+        share = np.where(square > 0, own.wind * wave / np.sqrt(square), 0.0)
         return np.asarray(found + (terms.E * (share * w)).sum(axis=1))
 
 
 def _joined(parts: Sequence[Array]) -> Array:
-    """Arrays (N, ..) one after the other with the lanes last; where they are of unequal size the rest is 0."""
-    shape = np.max([part.shape[1:] for part in parts], axis=0).astype(int) if parts[0].ndim > 1 else ()
-    found = np.zeros((sum(map(len, parts)), *shape))
-    ends = np.cumsum([0, *map(len, parts)])
-    for part, first in zip(parts, ends, strict=False):
-        found[(slice(first, first + len(part)), *map(slice, part.shape[1:]))] = part
-    return np.ascontiguousarray(np.moveaxis(found, 0, -1))
+    """Arrays (.., N) one after the other; where they are of unequal size the rest is 0."""
+    shape = np.max([part.shape[:-1] for part in parts], axis=0).astype(int)
+    rooms = [[*((0, most) for most in shape - part.shape[:-1]), (0, 0)] for part in parts]
+    return np.concatenate([np.pad(*each) for each in zip(parts, rooms, strict=True)], axis=-1)

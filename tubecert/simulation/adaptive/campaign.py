@@ -45,6 +45,7 @@ SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
 _HERE: Final = Serial()
 _WAVES: Final = ("amplitude", "frequency", "wave", "phase", "push")
+_BESIDE: Final = ("wind", "aim", "blowing", "gusting", "theta")
 Outcome = Literal["falsified", "tube left", "no result", "interrupted", "not falsified", "nothing claimed"]
 
 
@@ -171,11 +172,10 @@ def _attack_data(attack: Attack, setting: Setting) -> dict[str, Json]:
         data["adversary"] = {
             **to_json(found.comparison),
             "start": start[0].tolist(),
-            "h": {name: getattr(h, name)[0].tolist() for name in _WAVES},
+            "h": {name: getattr(h, name)[..., 0].tolist() for name in _WAVES},
         }
         if setting.uncertainty.sources:
-            beside = h.beside._asdict().items()
-            data["adversary"]["beside"] = {name: part[0].tolist() for name, part in beside}
+            data["adversary"]["beside"] = {name: getattr(h, name)[..., 0].tolist() for name in _BESIDE}
     return data
 
 
@@ -232,7 +232,7 @@ def _specified(setting: Setting) -> Cases:
     start = setting.started(np.ones(len(setting.x0))) if setting.varied else setting.x0
     own = Disturbance.from_expressions(setting.h, setting.model, 1)
     if setting.uncertainty.sources is not None:
-        own = replace(own, beside=usual(setting.uncertainty))
+        own = usual(setting.uncertainty, own)
     return Cases(start[None], own)
 
 

@@ -76,37 +76,18 @@ class LoopProblem:
         return self.controller in ("reference", "l1")
 
 
-class Beside(NamedTuple):
-    """What acts beside the waves of h: the wind w of E w, and the parameters of which ranges are known.
+class Disturbance(NamedTuple):
+    """What acts on N lanes; every array has the lanes last.
 
-    Every array has the lanes first. The wind is |w| <= `wind` (N,); its `aim` (N,) is 0 along `blowing` (N, k), 1
-    outward along E'M gamma_s, 2 along the inputs, E'B B'M gamma_s. It goes forwards and backwards as a square wave of
-    frequency and phase says: `gusting` (N, 2). `theta` (N, p) are the parameters.
-    """
+    h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'x + phase_k) + push c), where clip is the
+    projection to the ball of `radius` (inf: none), and c = B'M gamma_s / sqrt(|B'M gamma_s|^2 + layer^2) at x, the
+    direction that pushes away from the plan. At fixed x the rate of a wave is at most |amplitude| frequency, its slope
+    |amplitude| |wave|. `base` (m,): expressions of t and the states, or None for 0; amplitude (W, m, N), frequency (W,
+    N) in rad/s, wave (W, n, N), phase (W, N), the others (N,).
 
-    wind: Array
-    aim: Array
-    blowing: Array
-    gusting: Array
-    theta: Array
-
-
-def nothing_beside(N: int, k: int = 0) -> Beside:
-    """No wind, for N lanes of k winds; all parameters are known."""
-    return Beside(*(np.zeros((N, *shape)) for shape in ((), (), (k,), (2,), (0,))))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Disturbance:
-    """h(t, x) of N lanes; every array has the lanes first.
-
-    h = clip(base(t, x) + sum_k amplitude_k sin(frequency_k t + wave_k'(x - centre) + phase_k) + push c),
-    where clip is the projection to the ball of `radius` (inf: none), and c = B'M gamma_s /
-    sqrt(|B'M gamma_s|^2 + layer^2) at x, the direction that pushes away from the plan. At fixed x the rate of a wave is
-    at most |amplitude| frequency, its slope |amplitude| |wave|.
-
-    Shapes: base (m,) expressions of t and the states, or None for 0; amplitude (N, W, m), frequency (N, W) in rad/s,
-    wave (N, W, n), phase (N, W), push (N,), radius (N,), centre (n,).
+    The wind of E w is |w| <= `wind` (N,); its `aim` (N,) is 0 along `blowing` (k, N), 1 outward along E'M gamma_s, 2
+    along the inputs, E'B B'M gamma_s. It goes forwards and backwards as a square wave of frequency and phase says:
+    `gusting` (2, N). `theta` (p, N) are the parameters of which ranges are known.
     """
 
     base: tuple[Expression, ...] | None
@@ -116,20 +97,16 @@ class Disturbance:
     phase: Array
     push: Array
     radius: Array
-    centre: Array
-    beside: Beside
-    layer: float = 1e-3
-
-    @property
-    def lanes(self) -> int:
-        """N."""
-        return len(self.push)
+    layer: Array
+    wind: Array
+    aim: Array
+    blowing: Array
+    gusting: Array
+    theta: Array
 
     def of(self, lanes: NDArray[np.intp]) -> Disturbance:
-        """The disturbance of some lanes, given by their numbers."""
-        own = ("amplitude", "frequency", "wave", "phase", "push", "radius")
-        beside = Beside(*(part[lanes] for part in self.beside))
-        return replace(self, beside=beside, **{name: getattr(self, name)[lanes] for name in own})
+        """That of some lanes, given by their numbers."""
+        return Disturbance(self.base, *(part[..., lanes] for part in self[1:]))
 
     @classmethod
     def from_expressions(
@@ -137,21 +114,9 @@ class Disturbance:
     ) -> Disturbance:
         """The same h, given by expressions of t and the states, on every lane; none of k winds."""
         n, m = len(model.states), len(model.inputs)
-
-        def none(*shape: int) -> Array:
-            return np.zeros((lanes, *shape))
-
-        return cls(
-            base=base,
-            amplitude=none(0, m),
-            frequency=none(0),
-            wave=none(0, n),
-            phase=none(0),
-            push=none(),
-            radius=np.full(lanes, np.inf),
-            centre=np.zeros(n),
-            beside=nothing_beside(lanes, k),
-        )
+        waves, others = ((0, m), (0,), (0, n), (0,)), ((), (), (k,), (2,), (0,))
+        none = [np.zeros((*shape, lanes)) for shape in (*waves, (), (), (), *others)]
+        return cls(base, *none)._replace(radius=np.full(lanes, np.inf), layer=np.full(lanes, 1e-3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

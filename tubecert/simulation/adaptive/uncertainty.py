@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulation.adaptive.loops import Beside, Disturbance, nothing_beside
+from tubecert.simulation.adaptive.loops import Disturbance
 from tubecert.simulation.adaptive.reading import Certified
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
@@ -65,8 +65,7 @@ class Class:
         return 0 if self.sources is None else 3 + self.sources.k + len(self.sources.ranges)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sources:
+class Sources(NamedTuple):
     """What acts beside h: |w| <= `wind` for a w of k entries, parameters in `ranges` (p, 2); `pace` lambda, 1/s."""
 
     pace: float
@@ -190,36 +189,41 @@ def _begun(kind: Class, amplitude: Array, angle: Array, push: Array) -> Array:
     return np.asarray(low[:, None] * angle)
 
 
-def beside_of(kind: Class, genes: Array) -> Beside:
+def beside_of(kind: Class, genes: Array) -> dict[str, Array]:
     """Genes of N lanes: the aim of the wind, how fast it turns, its phase, its direction, the parameters."""
-    own = kind.sources
-    if own is None:
-        return nothing_beside(len(genes))
+    own = kind.sources or Sources(0.0, 0, 0.0, np.zeros((0, 2)))
     low, high = own.ranges.T
+    if kind.sources is None:
+        genes = np.zeros((len(genes), 3))
     turns = np.where(genes[:, 1] > _STEADY, own.pace * 10 ** (4 * genes[:, 1] - 1), 0.0)
-    return Beside(
-        wind=np.full(len(genes), own.wind * _ROUND),
-        aim=np.floor(2.999 * genes[:, 0]),
-        blowing=_unit(genes[:, 3 : 3 + own.k]),
-        gusting=np.stack([turns, 2 * np.pi * np.where(turns > 0, genes[:, 2], 0.25)], axis=1),
-        theta=low + (high - low) * np.clip(_ENDS * (genes[:, 3 + own.k :] - 0.5) + 0.5, 0.0, 1.0),
-    )
+    share = np.clip(_ENDS * (genes[:, 3 + own.k :] - 0.5) + 0.5, 0.0, 1.0)
+    return {
+        "wind": np.full(len(genes), own.wind * _ROUND),
+        "aim": np.floor(2.999 * genes[:, 0]),
+        "blowing": _unit(genes[:, 3 : 3 + own.k]).T,
+        "gusting": np.stack([turns, 2 * np.pi * np.where(turns > 0, genes[:, 2], 0.25)]),
+        "theta": (low + (high - low) * share).T,
+    }
 
 
-def usual(kind: Class) -> Beside:
-    """A wind that blows outward and does not turn, beside an h that is given."""
+def usual(kind: Class, h: Disturbance) -> Disturbance:
+    """An h that is given for one lane, beside a wind that blows outward and does not turn."""
     genes = np.full((1, kind.beside), 0.5)
     genes[:, 1:2] = 0.0
-    return beside_of(kind, genes)
+    return Disturbance(**(h._asdict() | beside_of(kind, genes)))
 
 
 def acting(kind: Class, waves: Waves, genes: Array, centre: Array, layer: float) -> Disturbance:
-    """Members and what acts beside them; what it adds up to is clipped beside a wind only: every h is in the class."""
+    """Members about a centre, and what acts beside them.
+
+    What it adds up to is clipped beside a wind only: every h is in the class.
+    """
+    N = len(genes)
+    waves = waves._replace(phase=waves.phase - waves.wave @ centre)
     return Disturbance(
         base=None,
-        **waves._asdict(),
-        radius=np.full(len(genes), kind.h if kind.sources else np.inf),
-        centre=centre,
-        beside=beside_of(kind, genes),
-        layer=layer,
+        radius=np.full(N, kind.h if kind.sources else np.inf),
+        layer=np.full(N, layer),
+        **{name: np.moveaxis(part, 0, -1) for name, part in waves._asdict().items()},
+        **beside_of(kind, genes),
     )
