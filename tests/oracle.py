@@ -8,6 +8,10 @@ import warnings
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from tubecert.synthesis.conic import Affine, Semidefinite, triangle
+
 _TOLERANCES = (1e-7, 1e-6, 1e-5)
 
 
@@ -34,3 +38,10 @@ def optimum(task: Any) -> Optimum | None:
         if task.status in (cvxpy.OPTIMAL, cvxpy.INFEASIBLE, cvxpy.UNBOUNDED):
             return Optimum(value=float(task.value), tolerance=tolerance)
     return None
+
+
+def semidefinite(constant: Any, slopes: Any) -> Semidefinite:
+    """A block from dense symmetric matrices: S_0 (n, n) and S_k as (N, n, n)."""
+    s0, s = np.asarray(constant, dtype=float), np.asarray(slopes, dtype=float)
+    i, j = triangle(len(s0))
+    return Semidefinite(orders=(len(s0),), entries=Affine(constant=s0[i, j], slopes=s[:, i, j].T))

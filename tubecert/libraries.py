@@ -15,7 +15,6 @@ DECIDING: Final = (
     "numpy",
     "scipy",
     "clarabel",
-    "scs",
     "cvxpy",
     "pyyaml",
     "python-flint",

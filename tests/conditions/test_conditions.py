@@ -12,9 +12,9 @@ from problems import ALIVE, alive, constants, margin_distance, margins_26
 from tubecert.bounds.constants import TABLE
 from tubecert.conditions import alone
 from tubecert.conditions.arithmetic import choose
-from tubecert.conditions.decimals import exact, next_up, printed, round_down, round_up
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.rates import RateRecipe, derived_constants
+from tubecert.enclosure.constant import exact, next_up, printed, round_down, round_up
 from tubecert.enclosure.interval import Interval
 from tubecert.kernel import margins_along
 from tubecert.kinds.table import kind_of

@@ -63,7 +63,7 @@ def test_what_only_shows_is_used_where_things_are_shown(name):
 def test_versions_are_shown():
     shown = json.loads(CliRunner().invoke(app, ["version", "--json"]).stdout)
     assert list(shown) == ["tubecert", "python", *libraries.DECIDING]
-    assert shown["scs"] == metadata.version("scs")
+    assert shown["cvxpy"] == metadata.version("cvxpy")
 
 
 @pytest.mark.parametrize("name", libraries.DECIDING)

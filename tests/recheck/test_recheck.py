@@ -9,7 +9,6 @@ import proven
 import pytest
 import rechecked
 import tampers
-import tubecert.conditions.derived
 from flint import ctx
 from rechecked import examine, respecified, sealed, written
 from systems import SMALL

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracle import optimum
+from oracle import optimum, semidefinite
 from scipy import sparse
 from systems import BOX_THREE, F_THREE, F_TWO, THREE, TWO
 from systems import plain_model as model
@@ -28,7 +28,7 @@ from tubecert.synthesis.chart import (
     degrees_of,
     monomial_matrix,
 )
-from tubecert.synthesis.conic import Affine, ConicProgram, SemidefiniteBlocks, semidefinite, solve, triangle
+from tubecert.synthesis.conic import Affine, ConicProgram, Semidefinite, solve, triangle
 from tubecert.synthesis.family import metric_family
 from tubecert.synthesis.frame import commuting_frame
 from tubecert.synthesis.gram import gram_form
@@ -85,7 +85,8 @@ def test_equalities_and_inequalities_hold(solver):
     )
     found = solve(program, solver)
     assert found.values == pytest.approx([0.25, 1.0], abs=1e-6)
-    assert np.linalg.eigvalsh(block.at(found.values))[0] > 0.7
+    low, beside, high = block.entries.at(found.values)
+    assert np.linalg.eigvalsh([[low, beside], [beside, high]])[0] > 0.7
 
 
 @pytest.mark.parametrize("solver", [*SOLVERS, "cvxpy:CLARABEL", "cvxpy:SCS"])
@@ -245,7 +246,7 @@ def least(coefficients, raised=0):
     form = gram_form((order,), 1, raised)
     slopes = sparse.hstack([form.pivots @ -np.eye(order + 1, 1), form.free])
     entries = Affine(constant=form.pivots @ np.array(coefficients), slopes=slopes)
-    block = SemidefiniteBlocks(orders=form.orders, entries=entries)
+    block = Semidefinite(orders=form.orders, entries=entries)
     return -solve(ConicProgram(cost=-np.eye(1, slopes.shape[1])[0], semidefinite=[block])).objective
 
 

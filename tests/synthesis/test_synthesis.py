@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 from tubecert.claims.failures import VariableForbidden
 from tubecert.claims.metric import MetricContraction
 from tubecert.cli.app import app
-from tubecert.conditions.decimals import round_down
 from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.constant import round_down
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import is_zero
 from tubecert.metric.verify import verify_metric

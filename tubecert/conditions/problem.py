@@ -23,7 +23,7 @@ from tubecert.bounds.constants import (
     WindConstants,
 )
 from tubecert.conditions.arithmetic import Array, T, minimum
-from tubecert.conditions.decimals import next_up, round_up
+from tubecert.enclosure.constant import next_up, round_up
 from tubecert.enclosure.interval import Interval
 
 Side = Callable[[str, Constant], Interval]

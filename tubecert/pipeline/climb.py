@@ -17,7 +17,7 @@ import numpy as np
 
 from tubecert.certificate.result import RateLimit, RateLimits
 from tubecert.claims.tube import TubeInSafeSet, TubeRadius
-from tubecert.conditions.decimals import round_down
+from tubecert.enclosure.constant import round_down
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel
 from tubecert.pipeline.deadline import Cut

@@ -17,9 +17,9 @@ from typing import Final, TypeVar
 
 from tubecert.bounds.constants import TABLE, WIND, Constant
 from tubecert.conditions.alone import supremum
-from tubecert.conditions.decimals import round_down
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.theorem import Asked
+from tubecert.enclosure.constant import round_down
 from tubecert.kinds.table import kind_of
 from tubecert.search.proposers import PROPOSERS
 from tubecert.search.scan import serves

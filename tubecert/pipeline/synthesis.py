@@ -34,10 +34,9 @@ from tubecert.claims.failures import (
 from tubecert.claims.family import Reason, Relax
 from tubecert.claims.metric import MetricFound
 from tubecert.claims.tube import TubeInSafeSet
-from tubecert.conditions.decimals import round_down
 from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.enclosure.constant import Witness
+from tubecert.enclosure.constant import Witness, round_down
 from tubecert.errors import SpecError
 from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import build, rank_decision

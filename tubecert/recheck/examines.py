@@ -1,8 +1,9 @@
 """What examines what: every key of a result, with the claim that examines it. A key without a row is refused (TC603).
 
-A row names the first words of a claim. A pair [below, above] is examined on the side that is claimed. `*` is a name of
-somebody else's, `**` all that stands below: the form of that is closed where it is read. Rows that name no claim are
-listed in the output as not examined; with `--spec` those of `FILE` are compared or told (`certificate.belonging`).
+A row names the first words of a claim and the keys that it examines; of a pair [below, above] the side that is claimed.
+`*` is a name of somebody else's, `**` all that stands below: the form of that is closed where it is read. Keys of rows
+that name no claim are listed in the output as not examined; with `--spec` those of `FILE` are compared or told
+(`certificate.belonging`).
 """
 
 from __future__ import annotations
@@ -11,201 +12,119 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from tubecert.recheck.document import Node
-from tubecert.recheck.kinds.table import KEYS
 
 NOTHING: Final = ""  # it claims nothing: for orientation
 FILE: Final = "--spec"  # it says which file, and no claim rests on it
 UNPROVEN: Final = "refuted"  # of what is not certified, examined in a certificate that says `refuted`
 
-_WHOLE: Final = "the specification and what repeats it"
-_CLAIM: Final = "the claim is that of the specification"
-_VERDICT: Final = "the verdict follows from the sections"
-_SMOOTH: Final = "f, B, W, h and the plan are smooth"
-_RADIUS: Final = "rho = "
-_PLAN: Final = "plan_defect"
-_0: Final = "0: sup D"
-_A: Final = "A: (26a)-(26c) at"
-_B: Final = "B: sup D < dbar at"
-
-EXAMINED: Final[Mapping[str, str]] = {
-    "verdict": _VERDICT,
-    "decided_by": _VERDICT,
-    "spec.effective_hash": _WHOLE,
-    "spec.file_hash": FILE,
-    "safe_set.*": _WHOLE,
-    "declared.*": _WHOLE,
-    "claim.id": _CLAIM,
-    "claim.horizon": _CLAIM,
-    "claim.for_all_time": _CLAIM,
-    "claim.period": _CLAIM,
-    "claim.domain.*": _CLAIM,
-    "claim.start.**": _CLAIM,
-    "claim.uncertainty": _CLAIM,
-    "claim.plans.**": _CLAIM,
-    "claim.wind.**": _CLAIM,
-    "claim.parameters.*": _CLAIM,
-    "overrides.epsilon": _WHOLE,
-    "overrides.rho_a": _WHOLE,
-    "overrides.bandwidth": _WHOLE,
-    "overrides.adaptation_rate": _WHOLE,
-    "overrides.conditions": _VERDICT,
-    "overrides.metric": FILE,
-    "overrides.settings.*": _WHOLE,
-    "assumptions.*": "assumptions are complete",
-    "reasons.claim": _VERDICT,
-    "reasons.verdict": _VERDICT,
-    "reasons.section": _VERDICT,
-    "reasons.margins.*": _VERDICT,
-    "reasons.predictor_gain": _VERDICT,
-    "reasons.at.**": UNPROVEN,
-    "reasons.failure.**": UNPROVEN,
-    "reasons.*": UNPROVEN,
-    "synthesis.asked.**": _WHOLE,
-    "plan.kind": _WHOLE,
-    "plan.interpolation": _WHOLE,
-    "plan.curve": _WHOLE,
-    "plan.file": FILE,
-    "plan.file_hash": FILE,
-    "plan.knots.t": _PLAN,
-    "plan.knots.x": _PLAN,
-    "plan.knots.u": _PLAN,
-    "metric.rate": _WHOLE,
-    "metric.dual_metric": _WHOLE,
-    "metric.verdict": _VERDICT,
-    "metric.margin": "C2 on the safe set",
-    "metric.largest_rate": "C2 on the safe set",
-    "metric.lower_on_set": "C1: M >= ",
-    "metric.upper_on_set": "C1: M <= ",
-    "metric.lower": "bounds are intervals",
-    "metric.upper": "bounds are intervals",
-    "metric.unique_geodesics.value": "geodesics are unique",
-    "metric.unique_geodesics.holds": "geodesics are unique",
-    "tube.epsilon": _WHOLE,
-    "tube.rho_a": _WHOLE,
-    "tube.rho": _RADIUS,
-    "tube.rho_r": _WHOLE,
-    "tube.half_widths.*": "half-width of",
-    "tube.coordinates": "the tube lies in the safe set",
-    "clearance.verdict": _VERDICT,
-    "clearance.decides": _VERDICT,
-    "clearance.clearance": "clearance from obstacle",
-    "clearance.shape.diagonal": "W in the plane of",
-    "clearance.shape.beside": "W in the plane of",
-    "inputs.input": _VERDICT,
-    "inputs.limits": _VERDICT,
-    "inputs.verdict": _VERDICT,
-    "inputs.plan.least": "u* of the plan",
-    "inputs.plan.greatest": "u* of the plan",
-    "inputs.bounds.*.least": _VERDICT,
-    "inputs.bounds.*.greatest": _VERDICT,
-    "inputs.bounds.*.feedback": "what is added to u*",
-    "inputs.bounds.*.adaptation": "what is added to u*",
-    "constants.lower.below": "lower >= ",
-    "constants.lower.above": NOTHING,
-    "constants.*.above": "<=",
-    "constants.*.below": NOTHING,
-    "no_adaptation.verdict": _0,
-    "no_adaptation.margin": _0,
-    "no_adaptation.distance": _0,
-    "no_adaptation.uncertainty_limit": "0: without adaptation for |h| <",
-    "no_adaptation.ultimate_radius": _0,
-    "conditions_26.verdict": _A,
-    "conditions_26.bandwidth": _A,
-    "conditions_26.adaptation_rate": _A,
-    "conditions_26.predictor_gain": _A,
-    "conditions_26.projection_radius": _A,
-    "conditions_26.margins.*": _A,
-    "conditions_26.ultimate_radius": "A: ultimate radius",
-    "distance.verdict": _B,
-    "distance.ultimate_radius": "B: ultimate radius",
-    **{
-        f"{pair}.{key}": claim
-        for pair, claim in (
-            ("conditions_26.least_adaptation", _A),
-            ("distance.split", _B),
-            ("distance.least_adaptation", _B),
-            ("distance.asked", _B),
-            ("proof.conditions_26", "A: its recipe"),
-            ("proof.distance", _B),
-        )
-        for key in ("bandwidth", "adaptation_rate", "predictor_gain", "projection_radius")
-    },
-    "conditions_26.least_adaptation.margins.*": _A,
-    **{
-        f"distance.{pair}.{key}": _B
-        for pair in ("split", "least_adaptation", "asked")
-        for key in ("margin", "ultimate_radius")
-    },
-    **{
-        f"{section}.shortfalls.{key}": NOTHING  # of what is not certified
-        for section in KEYS
-        for key in ("condition", "margin")
-    },
-    "proof.no_adaptation": _0,
-    "proof.distance.speed": _B,
-    "proof.distance.prediction_error": _B,
-    "proof.distance.uncertainty": _B,
-    # -- the specification: what it says is not believed either, but used
-    "spec.effective.tubecert": _WHOLE,
-    "spec.effective.name": FILE,
-    "spec.effective.expect.**": FILE,
-    "spec.effective.simulation.**": FILE,
-    "spec.effective.system.states": _CLAIM,
-    "spec.effective.system.inputs": _WHOLE,
-    "spec.effective.system.units.*": FILE,
-    "spec.effective.system.parameters.*": _CLAIM,
-    "spec.effective.system.f": "C2 on the safe set",
-    "spec.effective.system.B": "rank(B) = m on the safe set",
-    "spec.effective.system.outputs.*": "half-width of",
-    "spec.effective.system.tables.*.interpolation": _SMOOTH,
-    "spec.effective.system.tables.*.points": _SMOOTH,
-    "spec.effective.safe_set.*": _CLAIM,
-    "spec.effective.uncertainty.h": "h <=",
-    "spec.effective.uncertainty.bounds.*": _WHOLE,
-    "spec.effective.trajectory.kind": _WHOLE,
-    "spec.effective.trajectory.horizon": _CLAIM,
-    "spec.effective.trajectory.at": _PLAN,
-    "spec.effective.trajectory.input": _PLAN,
-    "spec.effective.trajectory.x": _PLAN,
-    "spec.effective.trajectory.u": _PLAN,
-    "spec.effective.trajectory.x.*": _CLAIM,
-    "spec.effective.trajectory.u.*": _CLAIM,
-    "spec.effective.trajectory.defect": _CLAIM,
-    "spec.effective.trajectory.interpolation": _WHOLE,
-    "spec.effective.trajectory.start": "the plan serves its task",
-    "spec.effective.trajectory.target": "the plan serves its task",
-    "spec.effective.trajectory.goal": "the plan serves its task",
-    "spec.effective.trajectory.file": FILE,
-    "spec.effective.trajectory.knots": FILE,
-    "spec.effective.trajectory.Q": FILE,
-    "spec.effective.trajectory.R": FILE,
-    "spec.effective.initial_state.at": "initial_distance <=",
-    "spec.effective.initial_state.within": "initial_distance <=",
-    "spec.effective.initial_state.box.*": "initial_distance <=",
-    "spec.effective.metric.dual_metric": "C1: M >= ",
-    "spec.effective.metric.rate": "C2 on the safe set",
-    "spec.effective.metric.bounds.lower": "metric.bounds: M >=",
-    "spec.effective.metric.bounds.upper": "metric.bounds: M <=",
-    "spec.effective.metric.synthesise.**": UNPROVEN,
-    "spec.effective.tube.epsilon": _RADIUS,
-    "spec.effective.tube.rho_a": _RADIUS,
-    "spec.effective.tube.coordinates": _WHOLE,
-    "spec.effective.tube.half_widths.*": _WHOLE,
-    "spec.effective.tube.gap": FILE,
-    "spec.effective.adaptation.A_m": "A: its recipe",
-    "spec.effective.adaptation.projection": "assumptions are complete",
-    "spec.effective.adaptation.projection.smooth": "assumptions are complete",
-    "spec.effective.conditions.decides": _VERDICT,
-    "spec.effective.obstacles.states": "W in the plane of",
-    "spec.effective.obstacles.polygon": "clearance from obstacle",
-    "spec.effective.obstacles.disc.center": "clearance from obstacle",
-    "spec.effective.obstacles.disc.radius": "clearance from obstacle",
-    "spec.effective.obstacles.decide": _VERDICT,
-    "spec.effective.limits.*": _VERDICT,
-    "spec.effective.disturbance.E": "wind_push <=",
-    "spec.effective.disturbance.bound": _CLAIM,
-    "spec.effective.disturbance.rate": _CLAIM,
+_ROWS: Final[Mapping[str, str]] = {
+    "the verdict follows from the sections": """
+        verdict decided_by overrides.conditions reasons.claim reasons.verdict reasons.section
+        reasons.margins.* reasons.predictor_gain metric.verdict clearance.verdict clearance.decides
+        inputs.input inputs.limits inputs.verdict inputs.bounds.*.least inputs.bounds.*.greatest
+        spec.effective.conditions.decides spec.effective.obstacles.decide spec.effective.limits.*
+    """,
+    "the specification and what repeats it": """
+        spec.effective_hash safe_set.* declared.* overrides.epsilon overrides.rho_a overrides.bandwidth
+        overrides.adaptation_rate overrides.settings.* synthesis.asked.** plan.kind plan.interpolation
+        plan.curve metric.rate metric.dual_metric tube.epsilon tube.rho_a tube.rho_r spec.effective.tubecert
+        spec.effective.system.inputs spec.effective.uncertainty.bounds.* spec.effective.trajectory.kind
+        spec.effective.trajectory.interpolation spec.effective.tube.coordinates
+        spec.effective.tube.half_widths.*
+    """,
+    FILE: """
+        spec.file_hash overrides.metric plan.file plan.file_hash spec.effective.name
+        spec.effective.expect.** spec.effective.simulation.** spec.effective.system.units.*
+        spec.effective.trajectory.file spec.effective.trajectory.knots spec.effective.trajectory.Q
+        spec.effective.trajectory.R spec.effective.tube.gap
+    """,
+    "the claim is that of the specification": """
+        claim.id claim.horizon claim.for_all_time claim.period claim.domain.* claim.start.**
+        claim.uncertainty claim.plans.** claim.wind.** claim.parameters.* spec.effective.system.states
+        spec.effective.system.parameters.* spec.effective.safe_set.* spec.effective.trajectory.horizon
+        spec.effective.trajectory.x.* spec.effective.trajectory.u.* spec.effective.trajectory.defect
+        spec.effective.disturbance.bound spec.effective.disturbance.rate
+    """,
+    "assumptions are complete": """
+        assumptions.* spec.effective.adaptation.projection spec.effective.adaptation.projection.smooth
+    """,
+    UNPROVEN: "reasons.at.** reasons.failure.** reasons.* spec.effective.metric.synthesise.**",
+    "plan_defect": """
+        plan.knots.t plan.knots.x plan.knots.u spec.effective.trajectory.at spec.effective.trajectory.input
+        spec.effective.trajectory.x spec.effective.trajectory.u
+    """,
+    "C2 on the safe set": """
+        metric.margin metric.largest_rate spec.effective.system.f spec.effective.metric.rate
+    """,
+    "C1: M >= ": "metric.lower_on_set spec.effective.metric.dual_metric",
+    "C1: M <= ": "metric.upper_on_set",
+    "bounds are intervals": "metric.lower metric.upper",
+    "geodesics are unique": "metric.unique_geodesics.value metric.unique_geodesics.holds",
+    "rho = ": "tube.rho spec.effective.tube.epsilon spec.effective.tube.rho_a",
+    "half-width of": "tube.half_widths.* spec.effective.system.outputs.*",
+    "the tube lies in the safe set": "tube.coordinates",
+    "clearance from obstacle": """
+        clearance.clearance spec.effective.obstacles.polygon spec.effective.obstacles.disc.center
+        spec.effective.obstacles.disc.radius
+    """,
+    "W in the plane of": """
+        clearance.shape.diagonal clearance.shape.beside spec.effective.obstacles.states
+    """,
+    "u* of the plan": "inputs.plan.least inputs.plan.greatest",
+    "what is added to u*": "inputs.bounds.*.feedback inputs.bounds.*.adaptation",
+    "lower >= ": "constants.lower.below",
+    NOTHING: """
+        constants.lower.above constants.*.below no_adaptation.shortfalls.condition
+        no_adaptation.shortfalls.margin conditions_26.shortfalls.condition conditions_26.shortfalls.margin
+        distance.shortfalls.condition distance.shortfalls.margin
+    """,
+    "<=": "constants.*.above",
+    "0: sup D": """
+        no_adaptation.verdict no_adaptation.margin no_adaptation.distance no_adaptation.ultimate_radius
+        proof.no_adaptation
+    """,
+    "0: without adaptation for |h| <": "no_adaptation.uncertainty_limit",
+    "A: (26a)-(26c) at": """
+        conditions_26.verdict conditions_26.bandwidth conditions_26.adaptation_rate
+        conditions_26.predictor_gain conditions_26.projection_radius conditions_26.margins.*
+        conditions_26.least_adaptation.bandwidth conditions_26.least_adaptation.adaptation_rate
+        conditions_26.least_adaptation.predictor_gain conditions_26.least_adaptation.projection_radius
+        conditions_26.least_adaptation.margins.*
+    """,
+    "A: ultimate radius": "conditions_26.ultimate_radius",
+    "B: sup D < dbar at": """
+        distance.verdict distance.split.bandwidth distance.split.adaptation_rate
+        distance.split.predictor_gain distance.split.projection_radius distance.least_adaptation.bandwidth
+        distance.least_adaptation.adaptation_rate distance.least_adaptation.predictor_gain
+        distance.least_adaptation.projection_radius distance.asked.bandwidth distance.asked.adaptation_rate
+        distance.asked.predictor_gain distance.asked.projection_radius proof.distance.bandwidth
+        proof.distance.adaptation_rate proof.distance.predictor_gain proof.distance.projection_radius
+        distance.split.margin distance.split.ultimate_radius distance.least_adaptation.margin
+        distance.least_adaptation.ultimate_radius distance.asked.margin distance.asked.ultimate_radius
+        proof.distance.speed proof.distance.prediction_error proof.distance.uncertainty
+    """,
+    "B: ultimate radius": "distance.ultimate_radius",
+    "A: its recipe": """
+        proof.conditions_26.bandwidth proof.conditions_26.adaptation_rate proof.conditions_26.predictor_gain
+        proof.conditions_26.projection_radius spec.effective.adaptation.A_m
+    """,
+    "rank(B) = m on the safe set": "spec.effective.system.B",
+    "f, B, W, h and the plan are smooth": """
+        spec.effective.system.tables.*.interpolation spec.effective.system.tables.*.points
+    """,
+    "h <=": "spec.effective.uncertainty.h",
+    "the plan serves its task": """
+        spec.effective.trajectory.start spec.effective.trajectory.target spec.effective.trajectory.goal
+    """,
+    "initial_distance <=": """
+        spec.effective.initial_state.at spec.effective.initial_state.within
+        spec.effective.initial_state.box.*
+    """,
+    "metric.bounds: M >=": "spec.effective.metric.bounds.lower",
+    "metric.bounds: M <=": "spec.effective.metric.bounds.upper",
+    "wind_push <=": "spec.effective.disturbance.E",
 }
+EXAMINED: Final[Mapping[str, str]] = {key: claim for claim, keys in _ROWS.items() for key in keys.split()}
 
 
 def met(result: Node) -> tuple[str, ...]:

@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 
 from tubecert.conditions.arithmetic import Array, quiet
-from tubecert.conditions.decimals import round_up
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.rates import RateTerms, rate_terms, zetas
+from tubecert.enclosure.constant import round_up
 from tubecert.search.scan import smallest
 
 _POINTS, _DIGITS = 41, 4  # of the bandwidths around one

@@ -14,12 +14,12 @@ import numpy as np
 
 from tubecert.conditions import distance as theorem_b
 from tubecert.conditions.arithmetic import Array, quiet
-from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.obstacles import reach
 from tubecert.conditions.problem import Numbers, TubeProblem
 from tubecert.conditions.theorem import Asked, Proposal
 from tubecert.conditions.wind import felt, is_felt, pushed, taken
+from tubecert.enclosure.constant import next_up, round_up
 from tubecert.kernel import obstacles
 from tubecert.search.bandwidths import bandwidths_around
 from tubecert.search.scan import boundary, minimum_lanes, minimum_log, serves, smallest

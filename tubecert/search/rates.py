@@ -13,11 +13,11 @@ import numpy as np
 from tubecert.conditions import distance as theorem_b
 from tubecert.conditions import rates as theorem_a
 from tubecert.conditions.arithmetic import Array, quiet
-from tubecert.conditions.decimals import next_up, round_up
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.rates import RateRecipe, theta, zetas
 from tubecert.conditions.theorem import Asked, Proposal
+from tubecert.enclosure.constant import next_up, round_up
 from tubecert.search import distance
 from tubecert.search.bandwidths import Bandwidth, RateSearch, bandwidth, bandwidths_around
 from tubecert.search.scan import minimum_log, serves, smallest

@@ -21,7 +21,6 @@ from tubecert.synthesis.conic import (
     Affine,
     ConicProgram,
     ConicSolution,
-    SemidefiniteBlocks,
     judged,
     triangle,
 )
@@ -50,7 +49,7 @@ def required(solver: str) -> None:
             Finding(
                 code="TC122",
                 message=f"the solver {solver} cannot be used: {name} {why}",
-                help=f"installed: {shown}; without cvxpy: clarabel, scs",
+                help=f"installed: {shown}; also: clarabel, scs",
             )
         ]
     )
@@ -100,9 +99,8 @@ def _parts(program: ConicProgram) -> Iterator[tuple[str, Affine]]:
     if program.inequalities is not None and len(program.inequalities.constant):
         yield "nonnegative", program.inequalities
     for block in program.semidefinite:
-        orders = block.orders if isinstance(block, SemidefiniteBlocks) else (block.order,)
         slopes, start = sparse.csr_array(block.entries.slopes), 0
-        for order in orders:
+        for order in block.orders:
             rows = start + _places(order)
             yield "semidefinite", Affine(constant=block.entries.constant[rows], slopes=slopes[rows])
             start += order * (order + 1) // 2

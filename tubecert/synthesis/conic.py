@@ -2,7 +2,7 @@
 
 Minimise c'y subject to S_0 + sum_k y_k S_k >= 0 for every block, g_0 + G y >= 0 and e_0 + E y = 0. All slopes are
 sparse and nothing is canonicalised, so that the wall time is the solver's own. Clarabel runs on one thread with fixed
-settings; SCS is the second solver, for cross-checks; every other one is reached through cvxpy (`bridge`).
+settings; SCS, for cross-checks, and every other solver are reached through cvxpy (`bridge`).
 Untrusted: what comes back is a proposal with an opinion, never a verdict.
 """
 
@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import sparse
 
 Array = NDArray[np.float64]
@@ -35,25 +35,11 @@ class Affine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Semidefinite:
-    """A symmetric matrix that is affine in y and has to be positive semidefinite.
+    """Symmetric matrices of the given `orders` that are affine in y and have to be positive semidefinite.
 
-    `entries` holds the upper triangle column by column, unscaled: row j(j+1)/2 + i is entry (i, j), i <= j.
+    `entries` holds their upper triangles one after another, column by column, unscaled: row j(j+1)/2 + i of a matrix
+    is entry (i, j), i <= j.
     """
-
-    order: int
-    entries: Affine
-
-    def at(self, y: Array) -> Array:
-        """The matrix at y, (order, order)."""
-        i, j = triangle(self.order)
-        full = np.zeros((self.order, self.order))
-        full[i, j] = full[j, i] = self.entries.at(y)
-        return full
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SemidefiniteBlocks:
-    """Several such matrices of the given `orders`: their entries one after another."""
 
     orders: tuple[int, ...]
     entries: Affine
@@ -64,18 +50,14 @@ class ConicProgram:
     """Minimise cost'y (N,) subject to `semidefinite` blocks, `inequalities` >= 0 and `equalities` = 0."""
 
     cost: Array
-    semidefinite: Sequence[Semidefinite | SemidefiniteBlocks] = ()
+    semidefinite: Sequence[Semidefinite] = ()
     inequalities: Affine | None = None
     equalities: Affine | None = None
 
     @property
     def orders(self) -> list[int]:
         """Orders of all semidefinite matrices."""
-        return [
-            order
-            for block in self.semidefinite
-            for order in (block.orders if isinstance(block, SemidefiniteBlocks) else (block.order,))
-        ]
+        return [order for block in self.semidefinite for order in block.orders]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,15 +104,6 @@ def _lower_triangle(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return j, i
 
 
-def semidefinite(constant: ArrayLike, slopes: ArrayLike) -> Semidefinite:
-    """A block from dense symmetric matrices: S_0 (n, n) and S_k as (N, n, n)."""
-    s0, s = np.asarray(constant, dtype=float), np.asarray(slopes, dtype=float)
-    i, j = triangle(len(s0))
-    return Semidefinite(
-        order=len(s0), entries=Affine(constant=s0[i, j], slopes=sparse.csr_array(s[:, i, j].T))
-    )
-
-
 def solve(
     program: ConicProgram,
     solver: str = "clarabel",
@@ -146,12 +119,11 @@ def solve(
     lifted = _stacked(program)
     if not (np.isfinite(lifted.slopes.data).all() and np.isfinite(lifted.constant).all()):
         return ConicSolution.none("the program has coefficients that are not finite")
-    if solver.startswith(CVXPY):
+    if solver != "clarabel":
         from tubecert.synthesis.bridge import solve_through_cvxpy
 
-        return solve_through_cvxpy(program, solver.removeprefix(CVXPY), tolerance, iterations)
-    if solver == "scs":
-        return _scs(program, lifted, tolerance, iterations or 20_000)
+        name = "SCS" if solver == "scs" else solver.removeprefix(CVXPY)
+        return solve_through_cvxpy(program, name, tolerance, iterations)
     return _clarabel(program, lifted, tolerance, iterations or 200)
 
 
@@ -222,50 +194,6 @@ def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations:
         iterations=int(found.iterations),
         seconds=float(found.solve_time),
     )
-
-
-def _scs(program: ConicProgram, rows: Affine, tolerance: float, iterations: int) -> ConicSolution:
-    import scs
-
-    order = np.concatenate(
-        [np.arange(_rows(program.equalities) + _rows(program.inequalities)), *_lower(program)]
-    )
-    order = order.astype(np.intp)
-    data = {
-        "A": sparse.csc_matrix(-rows.slopes[order]),
-        "b": rows.constant[order],
-        "c": np.asarray(program.cost, dtype=float),
-    }
-    cone = {
-        "z": _rows(program.equalities),
-        "l": _rows(program.inequalities),
-        "s": program.orders,
-    }
-    run = scs.SCS(data, cone, verbose=False, eps_abs=tolerance, eps_rel=tolerance, max_iters=iterations)
-    found = run.solve()
-    info = found["info"]
-    code = int(info["status_val"])
-    return judged(
-        np.array(found["x"]),
-        objective=float(info["pobj"]),
-        bound=float(info["dobj"]),
-        feasible={1: True, -2: False}.get(code),
-        finished=code in (1, -2),
-        status=f"SCS: {info['status']}",
-        iterations=int(info["iter"]),
-        seconds=float(info["setup_time"] + info["solve_time"]) / 1e3,
-    )
-
-
-def _lower(program: ConicProgram) -> list[NDArray[np.intp]]:
-    """For every block, where its lower triangle by columns stands in the upper triangle by columns."""
-    start = _rows(program.equalities) + _rows(program.inequalities)
-    places = []
-    for order in program.orders:
-        column, row = np.triu_indices(order)  # lower triangle by columns: column <= row
-        places.append(start + row * (row + 1) // 2 + column)
-        start += order * (order + 1) // 2
-    return places
 
 
 def judged(values: Array, **rest: Any) -> ConicSolution:

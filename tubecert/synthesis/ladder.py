@@ -12,7 +12,7 @@ from dataclasses import replace
 from fractions import Fraction
 from math import inf, sqrt
 
-from tubecert.conditions.decimals import round_down
+from tubecert.enclosure.constant import round_down
 from tubecert.progress import Phase, Step
 from tubecert.synthesis.attempts import Attempt, Box, Request, Route, attempted, guarded, kappa
 from tubecert.synthesis.family import MetricFamily, metric_family

@@ -111,7 +111,7 @@ class PointProgram:
 
 def _block(order: int, constant: Array, rows: Array, last: Array) -> Semidefinite:
     slopes = np.concatenate([rows, last[:, None]], axis=1)
-    return Semidefinite(order=order, entries=Affine(constant=constant, slopes=sparse.csr_array(slopes)))
+    return Semidefinite(orders=(order,), entries=Affine(constant=constant, slopes=sparse.csr_array(slopes)))
 
 
 def metric_points(forms: FormsTape, unknowns: Unknowns, at: Array, floor: Floor) -> Points:

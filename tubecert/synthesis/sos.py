@@ -17,7 +17,7 @@ from scipy import sparse
 
 from tubecert.progress import Phase, Step
 from tubecert.synthesis.chart import NotPolynomialError
-from tubecert.synthesis.conic import Affine, ConicProgram, ConicSolution, SemidefiniteBlocks, solve
+from tubecert.synthesis.conic import Affine, ConicProgram, ConicSolution, Semidefinite, solve
 from tubecert.synthesis.gram import gram_form
 from tubecert.synthesis.lifting import NotLiftedError
 from tubecert.synthesis.polynomial import Condition, Conditions, polynomial_conditions
@@ -73,7 +73,7 @@ def sos_program(conditions: Conditions, *, raised: int = 0) -> ConicProgram:
     entries = Affine(constant=np.concatenate(constants), slopes=slopes)
     cost = np.zeros(column)
     cost[count] = 1.0
-    return ConicProgram(cost=cost, semidefinite=[SemidefiniteBlocks(orders=tuple(orders), entries=entries)])
+    return ConicProgram(cost=cost, semidefinite=[Semidefinite(orders=tuple(orders), entries=entries)])
 
 
 def _clean(condition: Condition) -> Array:
