@@ -39,7 +39,7 @@ class Name:
 
 
 ALONE: Final = Name(key="no_adaptation", option="none", letter="0", title="no adaptation", adapts=False)
-RATES: Final = Name(key="conditions_26", option="26", letter="A", title="(26)")
+RATES: Final = Name(key="conditions_26", option="26", letter="A", title="paper's conditions")
 DISTANCE: Final = Name(key="distance", option="distance", letter="B", title="distance")
 
 NAMES: Final = (ALONE, RATES, DISTANCE)

@@ -402,7 +402,7 @@ def test_a_real_certificate(folder):
     first, second = run("certify", SPEC, "-o", "1.json"), run("certify", SPEC, "-o", "2.json", "-q")
     assert (first.exit_code, second.exit_code) == (0, 0)
     gains = second.stdout.rstrip().partition("; ")[2]
-    assert f"  gains       {gains}, by certificate A (26)\n" in first.stdout
+    assert f"  gains       {gains}, by certificate A, paper's conditions\n" in first.stdout
     one, two = (json.loads((folder / name).read_text(encoding="utf-8")) for name in ("1.json", "2.json"))
     assert one["hash"] == two["hash"] == digest(one["result"])
     assert one["result"]["verdict"] == "certified"

@@ -239,20 +239,15 @@ def test_bounds_are_rounded_to_the_side_that_stays_true(orbit):
             assert Fraction(value) <= Fraction(repr(item["below"]))
 
 
-def test_proven_declared_assumed_are_kept_apart(any_certificate):
-    proven, declared, assumed = section(any_certificate, "rests-on").blocks
-    result = any_certificate["result"]
-    assert assumed.items == tuple(map(assumption, result["assumptions"]))
+def test_what_is_declared_and_what_is_assumed_are_kept_apart(any_certificate):
+    declared, assumed = section(any_certificate, "rests-on").blocks
+    assert assumed.items == tuple(map(assumption, any_certificate["result"]["assumptions"]))
     assert declared.items == ("nothing",)
-    claims = [item for item in proven.items if item.startswith(("A (26)", "B distance"))]
-    holding = [k for k in ("conditions_26", "distance") if result.get(k, {}).get("verdict") == "certified"]
-    assert len(claims) == len(holding)
-    assert any("C2" in item for item in proven.items) == (result["metric"]["verdict"] == "certified")
 
 
 def test_declared_bounds_are_called_believed():
     believed = section(sealed(certificates.certified(declared={"h": 0.25})), "rests-on")
-    assert believed.blocks[1].items == ("|h| <= 0.25 on the tube",)
+    assert believed.blocks[0].items == ("|h| <= 0.25 on the tube",)
 
 
 @pytest.mark.slow

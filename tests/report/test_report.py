@@ -78,7 +78,7 @@ def test_what_is_claimed_comes_first_then_the_start_the_tube_and_the_gains():
     assert rows[0] == "  start       at 0"
     assert rows[1].startswith("  tube        ")
     assert rows[1].endswith("; rho = 0.04124 = 0.03124 (rho_r) + 0.01 (rho_a)")
-    assert "  gains       omega = 41.82 rad/s, Gamma = 1.394e7, by certificate A (26)" in rows
+    assert "  gains       omega = 41.82 rad/s, Gamma = 1.394e7, by certificate A, paper's conditions" in rows
     assert len(rows) < 16
     finite = certified()
     finite["spec"]["effective"]["trajectory"]["horizon"] = "2.5"
@@ -273,9 +273,11 @@ def test_half_widths_narrower_than_asked_for_are_told_with_what_limits_the_tube(
 
 
 def test_gains_that_do_not_serve_are_not_told_as_those_of_a_certificate():
-    """`gains ..., by certificate A (26)` stood below `refuted`, and what would lower certified gains beside it."""
+    """`gains ..., by certificate A, paper's conditions` stood below `refuted`, and what would lower them beside it."""
     text = shown(refuted_gains(), width=120)
-    assert "  gains       omega = 5 rad/s, Gamma = 100, refuted by certificate A (26)\n" in text
+    assert (
+        "  gains       omega = 5 rad/s, Gamma = 100, refuted by certificate A, paper's conditions\n" in text
+    )
     assert "That condition is proven not to hold." in text, "it stands above, not below"
     limited = certified(verdict="undecided")
     reason = {**undecided()["reasons"][0]}

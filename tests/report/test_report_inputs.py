@@ -77,10 +77,9 @@ def test_the_page_has_a_row_for_every_loop():
     section = next(section for section in page.sections if section.key == "inputs")
     table, figures = section.blocks
     assert [figure.key for figure in figures.figures] == ["input-0"]
-    assert [row[4].text for row in table.rows] == ["0 no adaptation", "A (26)", "B distance"]
+    assert [row[4].text for row in table.rows] == ["0 no adaptation", "A paper's conditions", "B distance"]
     assert table.rows[0][6].text == "20.1 %"
-    text = render_page(page)
-    assert "The input u stays within its limits, on the plan and in the loop." in text
+    assert "| u (N) | \\[-1, 1\\] | certified |" in render_page(page)
 
 
 @pytest.mark.slow

@@ -50,14 +50,14 @@ def test_a_certificate_that_is_not_stated_for_wind_says_so():
     [(label, line)] = beyond_its_theorem(windy)
     assert label == "undecided"
     assert line.startswith(
-        "certificate A (26): the theorem is stated for inputs and matched uncertainty alone"
+        "certificate A, paper's conditions: the theorem is stated for inputs and matched uncertainty alone"
     )
     calm = replace(windy, claim=replace(windy.claim, wind=None))
     assert not list(beyond_its_theorem(calm))
     decides = replace(windy, decided_by=("conditions_26",))
     assert not list(less_by_distance(decides)), "WINDY says itself what decides"
     [told] = beyond_its_theorem(decides)
-    assert told == ("help", "B distance is stated for them as well: --conditions B"), (
+    assert told == ("help", "B, distance, is stated for them as well: --conditions B"), (
         "the first line says why"
     )
 
@@ -69,6 +69,6 @@ def test_where_a_decides_unasked_it_is_said_what_b_asks_for():
     [(label, line)] = less_by_distance(unasked)
     assert label == "or"
     least = min(row.pair.adaptation_rate for row in rows(unasked) if row.section == "distance")
-    assert line.endswith(f"Gamma = {exact(least)}, by B distance: --conditions B")
+    assert line.endswith(f"Gamma = {exact(least)}, by B, distance: --conditions B")
     assert not list(less_by_distance(Certificate.from_json(proven(calm)).result))
     assert not list(less_by_distance(replace(unasked, decided_by=("distance",))))

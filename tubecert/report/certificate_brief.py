@@ -17,7 +17,7 @@ from tubecert.digits import down, exact, short, up
 from tubecert.kinds import ALONE, DISTANCE, RATES
 from tubecert.kinds.alone import AloneData
 from tubecert.report import claimed, reach
-from tubecert.report.gains import NAMES, Gains, deciding, rows
+from tubecert.report.gains import NAMES, Gains, deciding, named, rows
 from tubecert.report.page import Block, Facts, Reason
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import family
@@ -71,7 +71,7 @@ def _brief(result: Result) -> Iterator[tuple[str, str]]:
         yield from _brief_tube(result, result.tube)
     for row in deciding(result):
         how = "" if row.verdict is Verdict.CERTIFIED else f"{row.verdict} "
-        yield "gains", f"{row.text()}, {how}by certificate {NAMES[row.section]}"
+        yield "gains", f"{row.text()}, {how}by certificate {named(row.section)}"
     yield from less_by_distance(result)
     yield from beyond_its_theorem(result)
     if result.verdict is Verdict.CERTIFIED:  # else it says above what would help
@@ -136,7 +136,7 @@ def less_by_distance(result: Result) -> Iterator[tuple[str, str]]:
     if 2 * _adaptation(best) <= _adaptation(own[0]) or own[0].verdict is not Verdict.CERTIFIED:
         yield (
             "or",
-            f"{best.text()}, by {NAMES[best.section]}: --conditions B",
+            f"{best.text()}, by {named(best.section)}: --conditions B",
         )
 
 
@@ -151,9 +151,9 @@ def beyond_its_theorem(result: Result) -> Iterator[tuple[str, str]]:
     if not acts or section is None or section.verdict != Verdict.UNDECIDED:
         return
     if RATES.key not in result.decided_by:
-        yield "undecided", f"certificate {NAMES[RATES.key]}: {SAYS['wind_not_covered']}"
+        yield "undecided", f"certificate {named(RATES.key)}: {SAYS['wind_not_covered']}"
     elif not list(less_by_distance(result)):
-        yield "help", f"{NAMES[DISTANCE.key]} is stated for them as well: --conditions B"
+        yield "help", f"{named(DISTANCE.key)}, is stated for them as well: --conditions B"
 
 
 def without_adaptation(result: Result) -> Iterator[tuple[str, str]]:

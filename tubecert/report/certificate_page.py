@@ -6,13 +6,16 @@ rounded up, bounds from below down.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
+from math import isfinite
 
 from tubecert.bounds.constants import EVERY, meaning
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
+from tubecert.claims.conditions import SAYS, SHOWN, condition_name, equation
 from tubecert.claims.limits import InputWithinLimits
 from tubecert.digits import UNKNOWN, down, exact, short, up
+from tubecert.enclosure.constant import Constant
 from tubecert.records import to_json
 from tubecert.report import claimed, reach
 from tubecert.report.certificate_brief import first_blocks, reasons
@@ -33,10 +36,8 @@ from tubecert.report.page import (
     Table,
     Words,
 )
-from tubecert.report.page_conditions import conditions
 from tubecert.report.page_origin import check_again, provenance, system
 from tubecert.report.page_simulation import Simulated, simulated_blocks
-from tubecert.report.page_trust import declared, proven
 from tubecert.report.shares import filled
 from tubecert.verdict import Verdict
 
@@ -52,6 +53,10 @@ _SHARES = (
     "Shares of what the contraction can make good at the edge of the proven tube, from above. What has a large share "
     "makes the tube wide; a better plan or model helps there. What is missing to 100 % is the margin. The gains of "
     "each certificate were chosen by themselves, so columns need not agree."
+)
+_MARGIN = (
+    "A margin is (allowed - needed)/allowed: positive means that the condition holds. Its lower side is proven; the "
+    "upper side is what the margin can be at most, whatever the constants are within their enclosures."
 )
 _ROWS = (
     "Each row stands on its own: do not take ω from one row and Γ from another. The row marked * decides the verdict. "
@@ -128,7 +133,7 @@ def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator
     if blocks := tuple(_inputs(result)):
         yield Section(key="inputs", title="Inputs", blocks=blocks)
     if result.sections:
-        yield Section(key="conditions", title="Conditions and margins", blocks=tuple(conditions(result)))
+        yield Section(key="conditions", title="Conditions and margins", blocks=tuple(_conditions(result)))
     if simulated is not None:
         yield Section(key="simulation", title="Simulation", blocks=tuple(simulated_blocks(simulated)))
     yield Section(key="rests-on", title="What this rests on", blocks=tuple(_rests_on(result)))
@@ -261,9 +266,44 @@ def _input_row(result: Result, own: InputData, key: str | None) -> tuple[str, ..
     return (*first, NAMES[key], span, reach.used(own, key), *added)
 
 
+def _conditions(result: Result) -> Iterator[Block]:
+    """The conditions of each certificate at its gains with what is left of each, then what is missing without gains."""
+    pairs = ((key, own.decisive(asked=result.asked)) for key, own in result.sections.items())
+    found = [
+        _condition(NAMES[key], condition, margin)
+        for key, pair in pairs
+        for condition, margin in (pair.margins.items() if pair is not None else ())
+    ]
+    if found:
+        columns = ("certificate", "condition", "what it says", "proven margin", "at most")
+        yield Table(columns=columns, rows=tuple(found), note=_MARGIN)
+    for key, section in result.sections.items():
+        for item in section.shortfalls:
+            if item.needed is not None and item.allowed is not None:
+                told = f"{up(item.needed)} is needed, {down(item.allowed)} is allowed"
+                yield Words(text=f"{NAMES[key]}, {condition_name(item.condition)}: {told}.")
+
+
+def _condition(title: str, condition: str, margin: Constant) -> tuple[Cell, ...]:
+    low, high = margin.below, margin.above
+    return (
+        Cell(text=title),
+        Cell(text=SHOWN.get(condition, equation(condition))),
+        Cell(text=SAYS[condition]),
+        Cell(text=_percent(low, down), kind="number", share=min(low, 1.0) if low > 0 else None),
+        Cell(text=_percent(high, up), kind="number"),
+    )
+
+
+def _percent(share: float, shown: Callable[[float, int], str]) -> str:
+    return f"{shown(100 * share, 3)} %" if isfinite(share) else UNKNOWN
+
+
 def _rests_on(result: Result) -> Iterator[Block]:
-    yield Items(title="Proven", items=tuple(proven(result)) or ("nothing that could be relied on",))
-    yield Items(title="Declared, believed as given", items=tuple(declared(result)) or ("nothing",))
+    """What the specification declares and nobody proves, and what is assumed."""
+    names = {"h": "|h|", "h_x": "|dh/dx|", "h_t": "|dh/dt|"}
+    declared = [f"{names.get(k, k)} <= {up(v, 12)} on the tube" for k, v in sorted(result.declared.items())]
+    yield Items(title="Declared, believed as given", items=tuple(declared) or ("nothing",))
     yield Items(title="Assumed, not proven", items=tuple(item.told() for item in result.assumptions))
 
 

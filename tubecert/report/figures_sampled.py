@@ -15,7 +15,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.report.figures_axes import WIDTH, Point, blank, path, text
-from tubecert.report.figures_scene import Drawing, Outline, Plane, draw_obstacle, scene
+from tubecert.report.figures_scene import Drawing, Outline, Plane, draw_obstacles, scene
 from tubecert.report.page import Figure
 from tubecert.sampled_loop.record import Certificate, Result, Shares
 from tubecert.verdict import Verdict
@@ -136,10 +136,7 @@ def _planes(result: Result, x: Array, widths: Array) -> Iterator[Figure]:
             safe=((left, low), (right, high)),
         )
         chart, legend = scene(f"plane-{i}-{j}", plane, [], proven)
-        for obstacle in effective.obstacles:
-            if set(obstacle.states) == set(names):
-                draw_obstacle(chart, obstacle, names)
-        legend.append(("obstacle", "obstacle"))
+        legend += draw_obstacles(chart, effective.obstacles, names)
         title = f"Tube in the plane of {' and '.join(names)}"
         yield Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(legend))
 

@@ -151,12 +151,16 @@ def _height_of(plane: Plane, x: Axis, y: Axis) -> int:
     return min(max(height, 200), 420)
 
 
-def draw_obstacle(chart: Chart, obstacle: ObstacleView, names: tuple[str, str]) -> None:
-    """An obstacle in the plane of two states."""
-    a, b = (0, 1) if obstacle.states == names else (1, 0)
-    if obstacle.disc is not None:
-        center, radius = obstacle.disc.center, float(obstacle.disc.radius)
-        chart.ellipse((float(center[a]), float(center[b])), (radius, radius), "obstacle")
-    else:
-        corners = [(float(corner[a]), float(corner[b])) for corner in obstacle.polygon]
-        chart.area(corners, "obstacle")
+def draw_obstacles(
+    chart: Chart, obstacles: Sequence[ObstacleView], names: tuple[str, str]
+) -> list[tuple[str, str]]:
+    """Those in the plane of two states; what their colour means, if there are any."""
+    found = [obstacle for obstacle in obstacles if set(obstacle.states) == set(names)]
+    for obstacle in found:
+        a, b = (0, 1) if obstacle.states == names else (1, 0)
+        if obstacle.disc is not None:
+            center, radius = obstacle.disc.center, float(obstacle.disc.radius)
+            chart.ellipse((float(center[a]), float(center[b])), (radius, radius), "obstacle")
+        else:
+            chart.area([(float(corner[a]), float(corner[b])) for corner in obstacle.polygon], "obstacle")
+    return [("obstacle", "obstacle")] if found else []

@@ -8,8 +8,8 @@ from __future__ import annotations
 from tubecert.certificate.result import Result
 from tubecert.digits import near
 from tubecert.report.claimed import point
-from tubecert.report.figures_axes import Chart, Point
-from tubecert.report.figures_scene import Plane, draw_obstacle, scene
+from tubecert.report.figures_axes import Point
+from tubecert.report.figures_scene import Plane, draw_obstacles, scene
 from tubecert.report.outline import tube_outline
 from tubecert.report.page import Figure
 
@@ -59,8 +59,7 @@ def _tube(result: Result, plane: Plane) -> Figure:
     ]
     proven = result.tube is not None and result.tube.rho_r is not None
     chart, legend = scene(f"tube-{plane.index[0]}-{plane.index[1]}", plane, [p for p, _ in witnesses], proven)
-    for shown in _obstacles(result, plane, chart):
-        legend.append(shown)
+    legend += draw_obstacles(chart, result.spec.effective.obstacles, plane.names)
     if plane.plan:
         chart.dot(plane.plan[0], "start", words=f"start of the plan: {_pair(plane, plane.plan[0])}")
         legend.append(("start", "start of the plan" if len(plane.plan) > 1 else "the plan, an equilibrium"))
@@ -69,15 +68,6 @@ def _tube(result: Result, plane: Plane) -> Figure:
     if witnesses:
         legend.append(("witness", "witness"))
     return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(dict.fromkeys(legend)))
-
-
-def _obstacles(result: Result, plane: Plane, chart: Chart) -> list[tuple[str, str]]:
-    shown = []
-    for obstacle in result.spec.effective.obstacles:
-        if set(obstacle.states) == set(plane.names):
-            draw_obstacle(chart, obstacle, plane.names)
-            shown = [("obstacle", "obstacle")]
-    return shown
 
 
 def _pair(plane: Plane, value: Point) -> str:

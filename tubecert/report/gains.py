@@ -58,6 +58,11 @@ class Gains:
         return f"{percent(known)} {tightest}" if len(margins) > 1 and known is not None else percent(known)
 
 
+def named(key: str) -> str:
+    """A kind of certificate in a sentence: `A, paper's conditions`."""
+    return NAMES[key].replace(" ", ", ", 1)
+
+
 def gains_text(pair: Pair) -> str:
     """A set of gains as one reads it."""
     parts = ["feedback alone" if pair.bandwidth is None else f"omega = {exact(pair.bandwidth)} rad/s"]

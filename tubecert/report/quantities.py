@@ -107,8 +107,8 @@ def _of_tube(result: Result) -> Iterator[Quantity]:
             yield Quantity(name=name, value=getattr(tube, name))
         for state, width in (widths(result) or {}).items():
             yield Quantity(name=f"half_width.{state}", value=width)
-    for index, found in enumerate(result.clearance):
-        yield Quantity(name=f"clearance.{index}", value=found.clearance.below)
+    for number, found in enumerate(result.clearance, start=1):
+        yield Quantity(name=f"clearance.obstacle {number}", value=found.clearance.below)
 
 
 def _of_sampled_loop(result: SampledResult) -> Iterator[Quantity]:

@@ -52,7 +52,7 @@ class Row:
             point=point,
             verdict=str(result.verdict),
             failed=failed(result),
-            why=promise(outcome.result) if isinstance(outcome, SampledCertificate) else "",
+            why=_lacking(outcome),
             found={each.key: each for each in quantities(result)},
             gains=_found(outcome),
             sampled=isinstance(outcome, SampledCertificate),
@@ -143,6 +143,13 @@ class SweepTable:
         target = BytesIO()
         pyarrow.parquet.write_table(pyarrow.table(data), target, compression="snappy")
         return target.getvalue()
+
+
+def _lacking(outcome: Certificate | SampledCertificate) -> str:
+    """What is not proven, in words."""
+    if isinstance(outcome, SampledCertificate):
+        return promise(outcome.result)
+    return "; ".join(dict.fromkeys(reason.claim.title for reason in outcome.result.failed))
 
 
 def _found(outcome: Certificate | SampledCertificate) -> str:
