@@ -15,28 +15,6 @@ parameters are a contract: a reader of certificates decides by them, never by a 
 """
 
 # All of them, in this order, wherever one is read: a family of records is whole only when its members are loaded.
-from tubecert.claims import (  # isort: skip
-    metric,
-    tube,
-    bounds,
-    gains,
-    limits,
-    failures,
-    outcomes,
-    advice,
-    assumptions,
-    written,
-)
-
-__all__ = [
-    "advice",
-    "assumptions",
-    "bounds",
-    "failures",
-    "gains",
-    "limits",
-    "metric",
-    "outcomes",
-    "tube",
-    "written",
-]
+from tubecert.claims import (  # noqa: F401  # isort: skip
+    metric, tube, bounds, gains, limits, failures, outcomes, advice, assumptions, written,
+)  # fmt: skip

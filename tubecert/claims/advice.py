@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar, Final, Literal
+from functools import partial
+from typing import Final, Literal
 
-from tubecert.claims.family import CONSTANTS, Relax, Said, Side
+from tubecert.claims.family import CONSTANTS, Relax, Said, Side, plain
 from tubecert.digits import down, near, up
 from tubecert.records import Tagged
 
 _OF_H: Final = ("h", "h_x", "h_t")
 _LONGEST: Final = 60  # characters of h
+_advice = partial(plain, __name__, Relax)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,11 +39,7 @@ class PlanRemedy(Said, Tagged):
     __slots__ = ()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CorrectPlan(PlanRemedy):
-    """Correct the expressions."""
-
-    says: ClassVar[str] = "correct x or u there"
+CorrectPlan = plain(__name__, PlanRemedy, "CorrectPlan", "correct x or u there")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,11 +53,9 @@ class OtherInterpolation(PlanRemedy):
         return f"with interpolation: {self.interpolation} it would be {near(self.defect, 3)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MoreKnots(PlanRemedy):
-    """Give more knots, or integrate the dynamics between them."""
-
-    says: ClassVar[str] = "give more knots, or integrate the dynamics between them"
+MoreKnots = plain(
+    __name__, PlanRemedy, "MoreKnots", "give more knots, or integrate the dynamics between them"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,39 +85,11 @@ class RaiseBudget(Relax):
         return "raise --budget" + (": a proof ran out of boxes" if self.proof else "")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ShrinkTube(Relax):
-    """A smaller tube."""
-
-    says: ClassVar[str] = "shrink the tube"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReduceRadii(Relax):
-    """Smaller epsilon, rho_a or initial error."""
-
-    says: ClassVar[str] = "reduce epsilon, rho_a or the initial error"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeavePlanRoom(Relax):
-    """A plan with more room between its inputs and their limits."""
-
-    says: ClassVar[str] = "plan with more room to the limits"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReduceInitialError(Relax):
-    """A start nearer to the plan."""
-
-    says: ClassVar[str] = "reduce the initial error"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EnlargeSafeSet(Relax):
-    """A larger safe set."""
-
-    says: ClassVar[str] = "enlarge the safe set"
+ShrinkTube = _advice("ShrinkTube", "shrink the tube")
+ReduceRadii = _advice("ReduceRadii", "reduce epsilon, rho_a or the initial error")
+LeavePlanRoom = _advice("LeavePlanRoom", "plan with more room to the limits")
+ReduceInitialError = _advice("ReduceInitialError", "reduce the initial error")
+EnlargeSafeSet = _advice("EnlargeSafeSet", "enlarge the safe set")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,11 +116,7 @@ class LowerRate(Relax):
         return "lower the rate" if self.to is None else f"lower metric.rate to {down(self.to, 6)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OtherMetric(Relax):
-    """Another dual metric."""
-
-    says: ClassVar[str] = "give another dual metric"
+OtherMetric = _advice("OtherMetric", "give another dual metric")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,35 +164,14 @@ class AskForRateUpTo(Relax):
         return f"a rate up to {near(self.rate)}, which works on this box"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GiveInput(Relax):
-    """The mode needs an input."""
-
-    says: ClassVar[str] = "give it an input"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OtherVariables(Relax):
-    """Other variables of W, or none asked for."""
-
-    says: ClassVar[str] = "choose other variables, or leave them to tubecert"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LowerDegree(Relax):
-    """A lower degree of W."""
-
-    says: ClassVar[str] = "ask for a lower degree"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ConstantInputs(Relax):
-    """Inputs in which B is constant, such as the accelerations of joints."""
-
-    says: ClassVar[str] = (
-        "choose inputs in which B is constant, such as the accelerations of joints (tubecert init --template arm2 "
-        "shows how)"
-    )
+GiveInput = _advice("GiveInput", "give it an input")
+OtherVariables = _advice("OtherVariables", "choose other variables, or leave them to tubecert")
+LowerDegree = _advice("LowerDegree", "ask for a lower degree")
+ConstantInputs = _advice(
+    "ConstantInputs",
+    "choose inputs in which B is constant, such as the accelerations of joints (tubecert init --template arm2 "
+    "shows how)",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,32 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar, Literal
+from functools import partial
+from typing import Literal
 
-from tubecert.claims.family import Assumption
+from tubecert.claims.family import Assumption, plain
 from tubecert.digits import down, near, up
 from tubecert.enclosure.constant import Constant
 
+_assumption = partial(plain, __name__, Assumption)
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeastFeedback(Assumption):
-    """The feedback is the least k of the quadratic program, evaluated in continuous time and exactly."""
-
-    says: ClassVar[str] = (
-        "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, section 0); the "
-        "controller acts in continuous time and exactly, evaluates f(x*) + B(x*) u* itself and never the derivative "
-        "of a stored plan"
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StraightGeodesics(Assumption):
-    """Nothing, really: the metric is constant, its geodesics are straight and unique."""
-
-    says: ClassVar[str] = (
-        "the controller takes the straight line for the minimising geodesic; where the metric is constant, as here, it "
-        "is the only one"
-    )
+LeastFeedback = _assumption(
+    "LeastFeedback",
+    "the feedback is the least k of the quadratic program with this metric and rate (docs/theory, section 0); the "
+    "controller acts in continuous time and exactly, evaluates f(x*) + B(x*) u* itself and never the derivative "
+    "of a stored plan",
+)
+StraightGeodesics = _assumption(
+    "StraightGeodesics",
+    "the controller takes the straight line for the minimising geodesic; where the metric is constant, as here, it "
+    "is the only one",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,20 +49,11 @@ class ExactGeodesics(Assumption):
         return f"{exact}, and it is unique in the tube (not proven: G rho + L_G rho^2/8 {size})"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StartAtRest(Assumption):
-    """The predictor, the filter and the estimate start as the theorems have it."""
-
-    says: ClassVar[str] = (
-        "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball"
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HardProjection(Assumption):
-    """The projection is hard."""
-
-    says: ClassVar[str] = "the projection is hard"
+StartAtRest = _assumption(
+    "StartAtRest",
+    "xhat(0) = x(0), the filter starts at rest (u_a(0) = 0), and sigma_hat(0) lies in the projection's ball",
+)
+HardProjection = _assumption("HardProjection", "the projection is hard")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,25 +66,11 @@ class SmoothProjection(Assumption):
         return f"the projection is smooth with layer {near(self.layer)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PerfectState(Assumption):
-    """Measurement and actuation are ideal."""
-
-    says: ClassVar[str] = "the full state is measured without noise or delay, and inputs do not saturate"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FirstOrderFilter(Assumption):
-    """The low-pass filter of the adaptation."""
-
-    says: ClassVar[str] = "the filter is first order, C(s) = omega/(s + omega)"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ForAllTime(Assumption):
-    """There is no end of time."""
-
-    says: ClassVar[str] = "the claim is for all t >= 0"
+PerfectState = _assumption(
+    "PerfectState", "the full state is measured without noise or delay, and inputs do not saturate"
+)
+FirstOrderFilter = _assumption("FirstOrderFilter", "the filter is first order, C(s) = omega/(s + omega)")
+ForAllTime = _assumption("ForAllTime", "the claim is for all t >= 0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,11 +83,9 @@ class UpToHorizon(Assumption):
         return f"the claim is for 0 <= t <= {near(self.horizon)} s"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UncertaintyAsDeclared(Assumption):
-    """Bounds of the uncertainty are believed."""
-
-    says: ClassVar[str] = "the uncertainty obeys its declared bounds on the tube"
+UncertaintyAsDeclared = _assumption(
+    "UncertaintyAsDeclared", "the uncertainty obeys its declared bounds on the tube"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,11 +116,8 @@ class WindWithin(Assumption):
         return f"{wind}, and is otherwise arbitrary"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ParametersWithin(Assumption):
-    """The parameters of the claim are constant, anywhere in their ranges; the controller knows f, B at the middles."""
-
-    says: ClassVar[str] = (
-        "the parameters that are known by ranges are constant and lie in them; predictor, feedback and plan are those "
-        "of f and B at the middles of the ranges"
-    )
+ParametersWithin = _assumption(
+    "ParametersWithin",
+    "the parameters that are known by ranges are constant and lie in them; predictor, feedback and plan are those "
+    "of f and B at the middles of the ranges",
+)

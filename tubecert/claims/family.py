@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, TypeVar
 
 from tubecert.enclosure.constant import Witness
 from tubecert.records import INLINE, Tagged
@@ -66,6 +66,15 @@ class Assumption(Said, Tagged):
     """Something that is not proven here and that the certificate rests on; it says what is assumed."""
 
     __slots__ = ()
+
+
+M = TypeVar("M", bound=Said)
+
+
+def plain(module: str, family: type[M], name: str, says: str) -> type[M]:
+    """A member of a family without parameters, which says one thing; its tag is its name with underscores."""
+    made = type(name, (family,), {"says": says, "__doc__": says, "__module__": module})
+    return dataclass(frozen=True, slots=True, kw_only=True)(made)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

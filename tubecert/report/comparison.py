@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from io import StringIO
-from itertools import groupby
 from math import isfinite
 from pathlib import PurePath
 from typing import Final
@@ -127,19 +126,17 @@ def page_of(comparison: Comparison) -> Page:
 
 
 def _sections(comparison: Comparison) -> Iterator[Section]:
-    by_kind = {key: tuple(own) for key, own in groupby(comparison.quantities, key=lambda each: each.section)}
-    plain = by_kind.pop("", ())
-    glance = [each for each in plain if _at_a_glance(each)]
-    rows = [*_verdicts(comparison), *(_quantity(comparison, each) for each in glance)]
-    rows += (_kind(comparison, key) for key in by_kind)
+    plain = [each for each in comparison.quantities if not each.section]
+    kinds = dict.fromkeys(each.section for each in comparison.quantities if each.section)
+    rows = [*_verdicts(comparison), *(_quantity(comparison, each) for each in plain if _at_a_glance(each))]
+    rows += (_kind(comparison, key) for key in kinds)
     keys = Facts.of([("differ", ", ".join(comparison.differences))], ("differ",))
     differ = (keys,) if comparison.differences else ()
     yield Section(key="glance", title="At a glance", blocks=(_table(comparison, rows), *differ))
-    for key, own in (("tube", [each for each in plain if each not in glance]), *by_kind.items()):
-        rows = [_quantity(comparison, each) for each in own]
-        if rows:
-            title = SECTIONS.get(key, "Further numbers of the tube")
-            yield Section(key=key, title=title, blocks=(_table(comparison, rows),))
+    more = [each for each in comparison.quantities if each.name not in ("verdict", "failed")]
+    rows = [_quantity(comparison, each) for each in more if each.section or not _at_a_glance(each)]
+    if rows:
+        yield Section(key="numbers", title="Further numbers", blocks=(_table(comparison, rows),))
     differing = _differing(comparison)
     yield Section(key="differences", title="What differs in the specification", blocks=(differing,))
 
@@ -174,12 +171,8 @@ def _kind(comparison: Comparison, key: str) -> tuple[Cell, ...]:
 
 def _quantity(comparison: Comparison, quantity: Quantity) -> tuple[Cell, ...]:
     values = [side.value(quantity.key) for side in comparison.sides]
-    if quantity.name == "verdict":
-        cells = [Cell(text=str(value or MISSING), kind="verdict" if value else "text") for value in values]
-    else:
-        cells = [Cell(text=_told(quantity, value), kind="number") for value in values]
-    own = quantity.words.removeprefix(f"{SECTIONS.get(quantity.section, quantity.section)}, ")
-    return _row(own, cells, _change(quantity, values))
+    cells = [Cell(text=_told(quantity, value), kind="number") for value in values]
+    return _row(quantity.words, cells, _change(quantity, values))
 
 
 def _told(quantity: Quantity, value: Value) -> str:

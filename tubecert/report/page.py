@@ -195,4 +195,4 @@ def look(verdict: str) -> str:
 
 def typeset(text: str) -> str:
     """Words with their inequalities as one sign."""
-    return text.replace("<=", "≤").replace(">=", "≥")
+    return text.replace("<=", "≤").replace(">=", "≥").replace("+-", "±")
