@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
 from typing import Any, Final
@@ -37,38 +37,13 @@ _ACCENTS: Final = {
 }  # fmt: skip
 _BIG: Final = {"sum": "∑", "int": "∫"}
 _UPRIGHT: Final = {
-    "sup",
-    "inf",
-    "max",
-    "min",
-    "log",
-    "exp",
-    "sin",
-    "cos",
-    "tan",
-    "det",
-    "diag",
-    "sign",
-    "clip",
-    "Proj",
-    "Lip",
-}
+    "sup", "inf", "max", "min", "log", "exp", "sin", "cos", "tan", "det", "diag", "sign", "clip", "Proj", "Lip",
+}  # fmt: skip
 _SIGNS: Final = {
     "<=": "≤", ">=": "≥", "!=": "≠", "->": "→", ":=": "≔", "+-": "±", "-": "−", "*": "×", "..": "…", "oo": "∞",
     "[]": "□", "'": "′",
 }  # fmt: skip
-_SPLIT: Final = {
-    "=",
-    "<=",
-    ">=",
-    "<",
-    ">",
-    ",",
-    ";",
-    ":=",
-    "->",
-    "!=",
-}  # after which a formula in a line may be broken
+_SPLIT: Final = {"=", "<=", ">=", "<", ">", ",", ";", ":=", "->", "!="}  # a line may be broken after these
 _TOKEN: Final = re.compile(r"sigma_hat|oo\b|\d*\.?\d+(?:e-\d+)?|[A-Za-z]+\d*|\.\.+|<=|>=|!=|->|:=|\+-|\S")
 _SUB: Final = re.compile(r"-?[A-Za-z0-9]+\*?(?:[-+,]\w+)*")
 _SUB_OF_BIG: Final = re.compile(r"[^\s|^(\[]+(?:\([^)]*\))?")
@@ -84,7 +59,6 @@ class _Reader:
     text: str
     at: int = 0
     spaced: bool = False
-    out: list[tuple[str, str]] = field(default_factory=list)
 
     def token(self) -> str:
         """The next one; `spaced` says whether there was room before it."""
