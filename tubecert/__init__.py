@@ -19,14 +19,13 @@ if TYPE_CHECKING:
     from tubecert.library.checks import Checked, check
     from tubecert.library.comparing import Comparison, compare
     from tubecert.library.exporting import Exported, export
-    from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synthesise, verify
+    from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synth, verify
     from tubecert.library.pages import Report, report
     from tubecert.library.reading import read
     from tubecert.library.rechecking import Rechecked, recheck
     from tubecert.library.sampled import SampledCertification
-    from tubecert.library.sampled_simulation import SampledSimulation
     from tubecert.library.simulating import simulate
-    from tubecert.library.simulation import Simulation
+    from tubecert.library.simulation import SampledSimulation, Simulation
     from tubecert.library.specification import Specification, load, specification
     from tubecert.library.sweeping import Swept, sweep
     from tubecert.progress import Phase, Step, Unit
@@ -66,7 +65,7 @@ __all__ = [
     "simulate",
     "specification",
     "sweep",
-    "synthesise",
+    "synth",
     "verify",
 ]
 
@@ -84,12 +83,12 @@ _HOMES = {
     "Swept": "library.sweeping",
     "SynthesisedMetric": "library.metrics",
     "VerifiedMetric": "library.metrics",
-    "synthesise": "library.metrics",
+    "synth": "library.metrics",
     "verify": "library.metrics",
     "Rechecked": "library.rechecking",
     "Report": "library.pages",
     "SampledCertification": "library.sampled",
-    "SampledSimulation": "library.sampled_simulation",
+    "SampledSimulation": "library.simulation",
     "Simulation": "library.simulation",
     "simulate": "library.simulating",
     "Specification": "library.specification",
@@ -147,7 +146,8 @@ if not TYPE_CHECKING:  # a type checker knows what there is
         elif name in _ROOMS:
             value = _module(name)
         else:
-            raise AttributeError(f"module 'tubecert' has no attribute {name!r}")
+            hint = "; it is called synth, as the command is" if name == "synthesise" else ""
+            raise AttributeError(f"module 'tubecert' has no attribute {name!r}{hint}")
         globals()[name] = value
         return value
 

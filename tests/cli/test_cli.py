@@ -11,9 +11,9 @@ from commands import run
 
 from tubecert import __version__, pipeline
 from tubecert.certificate import digest
+from tubecert.certificate.belonging import ForeignError
 from tubecert.certificate.notes import joined
 from tubecert.certificate.result import Result
-from tubecert.cli.belonging import ForeignError
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.spec import canonical

@@ -13,7 +13,8 @@ from commands import run
 import tubecert
 from tubecert.bounds.constants import EVERY
 from tubecert.cli.app import app
-from tubecert.cli.everyday import Schema, Template
+from tubecert.cli.init import TEMPLATES
+from tubecert.cli.schema import SCHEMAS
 from tubecert.report import pages
 
 PACKAGE = Path(tubecert.__file__).parent
@@ -22,7 +23,7 @@ ROOT = PACKAGE.parent
 pytestmark = pytest.mark.usefixtures("folder")
 
 
-@pytest.mark.parametrize("name", Schema)
+@pytest.mark.parametrize("name", SCHEMAS)
 def test_schema(name):
     result = run("schema", name)
     assert result.exit_code == 0
@@ -37,7 +38,7 @@ def test_schema_of_the_specification_by_default():
 
 @pytest.mark.usefixtures("barely")
 @pytest.mark.slow
-@pytest.mark.parametrize("template", Template)
+@pytest.mark.parametrize("template", TEMPLATES)
 def test_templates_certify_as_they_are(template, folder):
     made = run("init", "--template", template)
     assert (made.exit_code, made.stderr) == (0, "")

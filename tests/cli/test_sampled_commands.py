@@ -130,15 +130,15 @@ def test_report_compare_and_recheck_know_it():
 
 @pytest.mark.slow
 def test_a_certificate_of_another_file_is_told():
-    from tubecert.cli import recheck as command
+    from tubecert.library.rechecking import _specified
 
     run("certify", "cart.yaml")
     text = Path("cart.certificate.json").read_text()
-    assert command._specification("cart.yaml", text, "it") == "belongs to cart.yaml"
+    assert _specified(text, "it", "cart.yaml") == "belongs to cart.yaml"
     Path("cart.yaml").write_text(sampled.SPEC.replace("bound: 0.05", "bound: 0.06"))
     told = "TC604: it does not belong to cart.yaml: disturbance differ"
     with pytest.raises(tubecert.SpecError, match=told):
-        command._specification("cart.yaml", text, "it")
+        _specified(text, "it", "cart.yaml")
 
 
 @pytest.mark.slow

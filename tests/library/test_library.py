@@ -20,9 +20,9 @@ from systems import SCALAR
 from typer.testing import CliRunner
 
 import tubecert as tc
+from tubecert import asking
 from tubecert.cli.app import app
 from tubecert.letters import NAMES
-from tubecert.library import plain
 from tubecert.pipeline.counting import claims_of
 
 ROOT = Path(__file__).parents[2]
@@ -172,9 +172,16 @@ def test_numbers_of_every_library_are_exact():
         sympy.Rational(1, 3),
         Fraction(-2, 6),
     )
-    assert [plain.number_text(value, "x") for value in values] == ["3", "0.1", "0.5", "0.10", "1/3", "-1/3"]
+    assert [asking.text_of_number(value, "x") for value in values] == [
+        "3",
+        "0.1",
+        "0.5",
+        "0.10",
+        "1/3",
+        "-1/3",
+    ]
     for value in (10**5000, True, 1j, None, np.longdouble(1) / 3):
-        refused("TC106", plain.number_text, value, "x")
+        refused("TC106", asking.text_of_number, value, "x")
 
 
 def test_texts_that_no_file_can_hold_are_refused():
@@ -194,8 +201,8 @@ def test_a_value_that_holds_itself_and_keys_that_are_none_or_occur_twice_are_ref
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_a_float_stands_for_its_shortest_decimal(value):
-    assert float(Fraction(plain.number_text(value, "x"))) == value
-    assert Fraction(plain.number_text(value, "x")) == Fraction(repr(value))
+    assert float(Fraction(asking.text_of_number(value, "x"))) == value
+    assert Fraction(asking.text_of_number(value, "x")) == Fraction(repr(value))
 
 
 def test_findings_show_the_entry():
@@ -361,7 +368,7 @@ def test_a_file_that_is_not_there():
 
 @pytest.mark.slow
 def test_a_metric_that_was_found_is_proven_again(tmp_path):
-    found = tc.synthesise(DATA, rate="0.3")
+    found = tc.synth(DATA, rate="0.3")
     assert found.proven
     assert (found.rate, found.verdict) == (0.3, "certified")
     found.save(tmp_path / "m.json")
@@ -389,7 +396,7 @@ def test_a_metric_that_does_not_hold():
 def test_wishes_that_mean_nothing_are_refused():
     given_ = {"objective": "best", "degree": 9, "variables": ["w"], "solver": "none", "route": "x"}
     for options in (*({key: value} for key, value in given_.items()), {"objective": "rate", "rate": 1}):
-        refused("TC112", tc.synthesise, DATA, **options)
+        refused("TC112", tc.synth, DATA, **options)
 
 
 @pytest.mark.slow
@@ -554,7 +561,7 @@ spec: tc.Specification = tc.load("plant.yaml")
 same = tc.specification({"name": "x", "safe_set": {"x": [-1, 1.5]}})
 steps: list[tc.Step] = []
 result = tc.certify(spec, rho_a=0.05, progress=steps.append)
-metric = tc.synthesise(spec, rate=1)
+metric = tc.synth(spec, rate=1)
 run = tc.simulate(result, runs=3)
 page = tc.report(result)
 page.save(Path("x.html"))
@@ -624,7 +631,7 @@ def test_keys_that_are_set_stand_in_place_of_those_of_the_specification():
     assert tc.recheck(result).confirmed
     refused("TC104", tc.certify, again, rho_a=0.2)
     refused("TC104", tc.certify, tc.load(DATA, settings={"metric.rate": 0.3}), metric=DATA["metric"])
-    refused("TC104", tc.synthesise, again, epsilon=0.2)
+    refused("TC104", tc.synth, again, epsilon=0.2)
     refused("TC104", tc.load, again, settings={"tube.epsilon": 0.2})
     refused("TC103", tc.load, DATA, settings={"tube.width": 0.2})
     refused("TC106", tc.load, DATA, settings={"tube.rho_a": object()})

@@ -111,7 +111,7 @@ def test_certify_answers_for_hardware_and_refuses_what_is_about_metrics(monkeypa
     about = {str(item.location).partition(":")[0] for item in refused.value.findings}
     assert about == {"rho_a", "conditions", "deadline", "jobs"}
     with pytest.raises(tc.SpecError, match="without a metric"):
-        tc.synthesise(question, rate=1)
+        tc.synth(question, rate=1)
 
 
 def test_the_controller_is_the_recursion_of_the_record():

@@ -4,7 +4,8 @@ import pytest
 from rechecked import certified, respecified, sealed
 from systems import SMALL
 
-from tubecert.cli.belonging import ForeignError, belongs
+from tubecert.certificate.belonging import ForeignError
+from tubecert.library.rechecking import belongs
 from tubecert.recheck.document import Node
 
 PLAN = "{kind: equilibrium, at: [0, 0], input: [0]}"

@@ -11,10 +11,11 @@ from rechecked import case_of, certified, digest, examine, failing, respecified,
 from systems import BLOWN, SCALAR, SMALL
 
 from tubecert import spec
+from tubecert.certificate.belonging import ForeignError
 from tubecert.certificate.result import Result
-from tubecert.cli.belonging import ForeignError, belongs
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.expression import number_text
+from tubecert.library.rechecking import belongs
 from tubecert.recheck import geodesics
 from tubecert.recheck.claims import of_certified
 from tubecert.recheck.constants import feedback_gain

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from simulated import CONFIGS, FLAT, certified, setting
 
-from tubecert import pipeline
+import tubecert
+from tubecert import asking, pipeline
 from tubecert.certificate import dump, seal
 from tubecert.certificate.belonging import compared
 from tubecert.claims.family import Reason
 from tubecert.claims.metric import MetricDefinite
-from tubecert.cli.simulating import Source
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.letters import ADAPTIVE, name_of, words_of
 from tubecert.library.certification import read as read_file
@@ -156,7 +156,7 @@ def test_the_uncertainty_of_simulation_replaces_that_of_the_specification():
 
 
 def test_kinds_are_named_alike_everywhere():
-    assert {item.value for item in Source} == set(words_of(ADAPTIVE))
+    assert set(asking.words_of(tubecert.simulate)["gains"].words) == set(words_of(ADAPTIVE))
 
 
 @pytest.mark.slow

@@ -4,194 +4,135 @@ from __future__ import annotations
 
 import json
 import shlex
-import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from tubecert import certificate
-from tubecert.cli import keeper, telling
-from tubecert.cli.options import Output, flag
-from tubecert.cli.presenting import present
-from tubecert.cli.report import check_pages, write_pages
-from tubecert.cli.settings import settings_of
-from tubecert.cli.targets import plan_of, refused, spare
-from tubecert.digits import exact
+from tubecert.asking import Text, asked_by, words_of
+from tubecert.cli import keeper
+from tubecert.cli.adapter import SET, SPEC, Output, command
 from tubecert.errors import ExitCode, TubecertError
-from tubecert.files import read
-from tubecert.library.asked import certification_numbers, jobs_of, require_nothing_of_a_metric
-from tubecert.printable import visible
-from tubecert.report.terminal import Terminal
+from tubecert.library import certifying
 
 if TYPE_CHECKING:
-    from tubecert.certificate.result import Result
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
     from tubecert.pipeline.synthesised import Synthesised
-    from tubecert.spec import Spec
+    from tubecert.spec import Setting, Spec
 
 _OF_SEARCH: Final = Fraction(1, 2)  # of the time that is given: the certification has the rest
+_AFTER = """\b
+Examples:
+  tubecert certify plant.yaml
+  tubecert certify plant.yaml --rho-a 0.05 --conditions all -o plant.json
+  tubecert certify plant.yaml --set tube.epsilon=0.3 --set system.parameters.m=0.5
+  tubecert certify plant.yaml --bandwidth 50 --adaptation-rate 2e7
+  tubecert certify plant.yaml --report plant.html
+  tubecert certify plant.yaml -q -o - | jq .result.tube
+"""
+_WORDS: Final = {
+    "spec": SPEC,
+    "set_": SET,
+    **words_of(certifying.certify),
+    "output": Text("The certificate; - is stdout.  [SPEC's stem.certificate.json]", "FILE", short="-o"),
+    "report": Text("A page about it, too: FILE.html or FILE.md; may be repeated.", "FILE", many=True),
+}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Given:
-    """What the command line says; `numbers` are texts, by the names of their options."""
+@command(_WORDS, certifying.PAIR, short="Prove the tube, find the smallest gains.", after=_AFTER)
+def certify(
+    how: Output,
+    spec: str,
+    *,
+    set_: Sequence[Setting] = (),
+    output: str | None = None,
+    report: Sequence[str] = (),
+    **asked: Any,
+) -> ExitCode:
+    """Prove the tube around the plan and find the smallest gains; always write the certificate."""
+    if seconds := asked.get("deadline"):
+        asked["deadline"] = Fraction(keeper.left_of(float(seconds), interrupted=True)) * _OF_SEARCH
+    from tubecert import certificate
+    from tubecert.cli import telling
+    from tubecert.cli.report import check_pages, write_pages
+    from tubecert.cli.telling import spare
+    from tubecert.library.specification import Specification
+    from tubecert.spec import load
 
-    spec: str
-    settings: Sequence[str]
-    metric: Path | None
-    conditions: str | None
-    numbers: Mapping[str, str | None]
-    jobs: str
-    scheduler: str | None
-    target: str | None
-    pages: Sequence[str]
-
-
-def run(given: Given, output: Output) -> ExitCode:
-    """Certify."""
-    numbers = certification_numbers(given.numbers, flag)
-    seconds = None if numbers.deadline is None else keeper.left_of(float(numbers.deadline), interrupted=True)
-    jobs = jobs_of("--jobs", given.jobs)
-    radii = {name: given.numbers[name] for name in ("rho_a", "epsilon")}
-    settings = settings_of(given.settings, metric=given.metric, **radii)
-    target = _target(given)
-    pages = _pages(given, target)
-    from tubecert import spec
-    from tubecert.spec.metric_file import with_metric
-
-    system = spec.load(given.spec, settings)
-    if system.hardware is not None:
-        spare(target, {"plan": plan_of(given.spec, system)})
-        return _sampled(given, system, (target, pages), output)
-    if given.metric is not None:
-        system = with_metric(system, str(given.metric))
-    kept = _kept_place(given, system, target)
-    from tubecert.library.certifying import (
-        certified,  # numpy and the rest, once the input is known to be readable
-    )
-    from tubecert.library.workers import workers_of
-
-    workers = workers_of(jobs, given.scheduler, "--scheduler")
-    options = numbers.options(conditions=given.conditions, metric=given.metric)
-    terminal = Terminal.stderr(color=output.color)
-    if system.metric is None and system.synthesis is not None:
-        telling.warn_of_size(system, terminal, output)
-    with telling.shown(terminal, output) as report:
-        found = certified(
-            system,
-            options,
-            report,
-            seconds=None if seconds is None else Fraction(seconds) * _OF_SEARCH,
-            command=_command(),
-            workers=workers,
-            kept=telling.kept(lambda so_far: _will(so_far, kept)),
-        )
+    metric = asked.get("metric")
+    target = output or f"{Path(spec).stem}.certificate.json"
+    certificate.check_target(target)
+    inputs = {"specification": spec, "metric file": metric}
+    spare(target, inputs)
+    check_pages(report, {**inputs, "certificate": None if target == certificate.STDOUT else target})
+    system = load(spec, set_)
+    kept = _kept_place(spec, system, target, synthesised=metric is None)
+    if kept is not None:
+        telling.warn_of_size(system, how)
+    heard = telling.kept(lambda so_far: _will(so_far, kept))
+    with telling.shown(how) as progress, asked_by(heard=heard):
+        found = certifying.certify(Specification(spec=system), **asked, progress=progress)
     if target != certificate.STDOUT:
-        certificate.write_text(target, found.text)
-    metric = _kept_metric(found.result, kept)
-    write_pages(pages, found.certificate)
-    written = [("metric", metric)] if metric else []
-    _show(found, [*written, *_closing(found, system, (target, pages))], output)
+        found.save(target)
+    new = _kept_metric(found, kept)
+    write_pages(report, found.certificate)
+    written = [("certificate", target), *(("page", page) for page in report)]
+    _show(found, [*([("metric", new)] if new else []), *written, *_next(found, system, target)], how)
     return found.verdict.exit_code
 
 
-def _sampled(given: Given, system: Spec, files: tuple[str, Sequence[str]], output: Output) -> ExitCode:
-    """The same of a sampled loop; `files` are that of the certificate and those of pages."""
-    words = {"metric": given.metric, "conditions": given.conditions, "scheduler": given.scheduler}
-    words |= {"deadline": None, "jobs": None if given.jobs == "1" else given.jobs}
-    require_nothing_of_a_metric({**given.numbers, **words}, flag)
-    from tubecert.library import sampled
-
-    target, pages = files
-    with telling.shown(Terminal.stderr(color=output.color), output) as report:
-        found = sampled.certified(system, progress=report, command=_command())
-    if target != certificate.STDOUT:
-        certificate.write_text(target, found.text)
-    write_pages(pages, found.certificate)
-    after = [] if system.controller == "none" else ["export"]
-    _show(found, _closing(found, system, files, after), output)
-    return found.verdict.exit_code
-
-
-def _closing(
-    found: Certification | SampledCertification,
-    spec: Spec,
-    files: tuple[str, Sequence[str]],
-    after: Sequence[str] = (),
-) -> Iterator[tuple[str, str]]:
-    """What was written, and the commands that come next."""
-    target, pages = files
-    name = shlex.quote(target)
-    yield "certificate", target
-    yield from (("page", page) for page in pages)
+def _next(found: Certification | SampledCertification, spec: Spec, target: str) -> Iterator[tuple[str, str]]:
+    """The commands that come next."""
+    name, exported = shlex.quote(target), spec.hardware is not None and spec.controller != "none"
     if found.certified:
         yield "next", f"tubecert recheck {name}"
         yield "", f"tubecert simulate {shlex.quote(spec.path)} --certificate {name}"
-    if found.certified and after:
+    if found.certified and exported:
         yield "", f"tubecert export {name} -o {shlex.quote(spec.name)}.controller"
-    if not (found.certified and after):
+    else:
         yield "more", f"-v here; tubecert report {name}: a page with figures"
-
-
-def _command() -> str:
-    return visible(shlex.join(["tubecert", *sys.argv[1:]]))
 
 
 def _will(found: Synthesised, target: str | None) -> keeper.Will | None:
     """The metric that was found, if the certification does not come to its end."""
     if target is None or found.file is None:
         return None
+    from tubecert import certificate
+    from tubecert.cli import telling
+    from tubecert.digits import exact
+
     telling.found(f"metric proven, rate {exact(found.file.rate)} 1/s: kept in {target}")
     text = certificate.dump(found.file.to_json())
     return {"files": {target: text}, "said": "", "code": ExitCode.UNDECIDED.value}
 
 
-def _target(given: Given) -> str:
-    """Where the certificate goes, checked before any work is done.
-
-    Raises `TargetError` if it cannot go there, or would take the place of an input.
-    """
-    target = f"{Path(given.spec).stem}.certificate.json" if given.target is None else given.target
-    certificate.check_target(target)
-    spare(target, {"specification": given.spec, "metric file": given.metric})
-    return target
-
-
-def _pages(given: Given, target: str) -> list[str]:
-    """Where the pages about the certificate go, checked before any work is done. Raises `TargetError`."""
-    pages = list(given.pages)
-    written = None if target == certificate.STDOUT else target
-    check_pages(pages, {"specification": given.spec, "metric file": given.metric, "certificate": written})
-    return pages
-
-
-def _kept_place(given: Given, system: Spec, beside: str) -> str | None:
+def _kept_place(file: str, system: Spec, beside: str, *, synthesised: bool) -> str | None:
     """Where a metric that is synthesised on the way is kept: beside the certificate; None if there will be none.
 
     Raises `TargetError` if it cannot go there, or would take the place of an input or of what somebody wrote by hand.
     """
-    plan = plan_of(given.spec, system)
-    if beside == certificate.STDOUT:
-        return None
+    from tubecert import certificate
+    from tubecert.cli.telling import plan_of, refused, spare
+
+    plan = plan_of(file, system)
     spare(beside, {"plan": plan})
-    if system.metric is not None or system.synthesis is None:
+    if beside == certificate.STDOUT or not synthesised or system.metric or system.synthesis is None:
         return None
     name = Path(beside).name.removesuffix(".json").removesuffix(".certificate")
     target = str(Path(beside).with_name(f"{name}.metric.json"))
     certificate.check_target(target)
-    spare(target, {"specification": given.spec, "plan": plan})
-    if Path(target).exists() and not _synthesised(target):
+    spare(target, {"specification": file, "plan": plan})
+    if Path(target).exists() and not _by_tubecert(target):
         raise refused(
             f"{target} was not written by tubecert and would be overwritten by the metric that is synthesised"
         )
     return target
 
 
-def _synthesised(path: str) -> bool:
+def _by_tubecert(path: str) -> bool:
     """Whether a file is a metric that tubecert wrote: it can write it again."""
+    from tubecert.files import read
     from tubecert.spec.source import METRIC
 
     try:
@@ -201,26 +142,32 @@ def _synthesised(path: str) -> bool:
     return isinstance(content, dict) and "solver" in content and "verified_on" in content
 
 
-def _kept_metric(result: Result, target: str | None) -> str | None:
+def _kept_metric(found: Certification | SampledCertification, target: str | None) -> str | None:
     """The file in which a synthesised metric was kept, None if there is none."""
+    if target is None:
+        return None
+    from tubecert import certificate
     from tubecert.certificate.metric_file import metric_file
+    from tubecert.library.certification import Certification
     from tubecert.verdict import Verdict
 
-    metric, synthesis = result.metric, result.synthesis
+    assert isinstance(found, Certification)
+    metric, synthesis = found.metric, found.result.synthesis
     solver = None if synthesis is None or synthesis.search is None else synthesis.search.solver
-    if target is None or solver is None or metric is None or metric.verdict is not Verdict.CERTIFIED:
+    if solver is None or metric is None or metric.verdict is not Verdict.CERTIFIED:
         return None
-    certificate.write(target, metric_file(result.safe_set, metric, solver).to_json())
+    certificate.write(target, metric_file(found.result.safe_set, metric, solver).to_json())
     return target
 
 
 def _show(
-    found: Certification | SampledCertification, files: Iterable[tuple[str, str]], output: Output
+    found: Certification | SampledCertification, closing: Iterable[tuple[str, str]], how: Output
 ) -> None:
-    """The page on stdout, with `files` by what they are; or the certificate, with the verdict line on stderr."""
+    """The page on stdout, with what is written and comes next; or the certificate, with the verdict on stderr."""
+    from tubecert import certificate
+    from tubecert.cli.telling import present
     from tubecert.library.stated import page_of
 
-    closing, page = list(files), page_of(found.certificate, all_of_it=output.verbose)
-    target = dict(closing)["certificate"]
-    data = found.text if output.json or target == certificate.STDOUT else None
-    present(output, page, closing, data)
+    lines, page = list(closing), page_of(found.certificate, all_of_it=how.verbose)
+    data = found.text if how.json or dict(lines)["certificate"] == certificate.STDOUT else None
+    present(how, page, lines, data)

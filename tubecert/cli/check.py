@@ -5,112 +5,104 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from tubecert.cli import keeper, telling
-from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Output
-from tubecert.cli.settings import settings_of
-from tubecert.cli.targets import refused
-from tubecert.errors import ExitCode
-from tubecert.findings import Finding, Severity
-from tubecert.library.numbers import Numbers
-from tubecert.printable import printable_json
-from tubecert.progress import Phase
-from tubecert.records import to_json
-from tubecert.report.findings import as_data, render, summary
-from tubecert.report.terminal import Terminal
+from tubecert.asking import Choice, Exact, Flag, Text, refuse
+from tubecert.cli import keeper
+from tubecert.cli.adapter import ENDING, SET, Output, command
+from tubecert.errors import ExitCode, SpecError, TubecertError
+from tubecert.library.certifying import SCHEDULER
 
 if TYPE_CHECKING:
     from tubecert.checking import Checked, CheckOptions
     from tubecert.executor import Executor
+    from tubecert.report.terminal import Terminal
+    from tubecert.spec import Setting, Spec
 
+_AFTER = """\b
+Examples:
+  tubecert check plant.yaml
+  tubecert check configs/ other.yaml --strict
+  tubecert check configs/ --certify --jobs 4 --format junit > report.xml
+
+\b
+In a workflow of GitHub (GITHUB_ACTIONS=true) findings become annotations, and a summary of the step.
+Exit codes: 0 nothing to complain about; 1 errors in the mathematics, or not as expected; 2 invalid
+files; 4 undecided.
+"""
 _SUFFIXES = {".yaml", ".yml"}
 _OF_SPECIFICATIONS = rb"""(?m)^\s*\{?\s*["']?(tubecert|safe_set)["']?\s*:"""
 _SHOWN = 5
 _WORST = (ExitCode.CERTIFIED, ExitCode.UNDECIDED, ExitCode.NOT_CERTIFIED, ExitCode.INVALID)
+_FORMATS: Final = ("text", "json", "github", "junit", "sarif")
+_WORDS: Final = {
+    "specs": Text("Specifications, or folders with some.", "SPEC", place=True, many=True),
+    "format_": Choice("What to write.  [text; github in its workflows]", words=_FORMATS),
+    "certify": Flag("Certify, too, and compare with the file's expect."),
+    "family": Text("Whether plans (CSV, or specifications) are of this family.", "FILE"),
+    "strict": Flag("Warnings are errors."),
+    "skip_others": Flag("Leave YAML files that are no specifications alone."),
+    "set_": SET,
+    "jobs": Exact("Files checked at a time.", whole=True),
+    "scheduler": SCHEDULER,
+    "no_cache": Flag("Do not use what earlier checks have found."),
+    "gap": Exact("As for certify; with --certify.", below=1),
+    "deadline": ENDING,
+    "budget": Exact("As for certify; with --certify.", whole=True),
+}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Given:
-    """What the command line says; numbers as texts."""
+@command(_WORDS, short="Check specifications, for you and for CI.", after=_AFTER)
+def check(
+    how: Output,
+    specs: Sequence[str],
+    *,
+    format_: str | None = None,
+    certify: bool = False,
+    family: str | None = None,
+    strict: bool = False,
+    skip_others: bool = False,
+    set_: Sequence[Setting] = (),
+    jobs: int = 1,
+    scheduler: str | None = None,
+    no_cache: bool = False,
+    gap: Any = "1/100",
+    budget: int | None = None,
+) -> ExitCode:
+    """Check specifications: format, mathematics, what is odd; with --certify also the locked results.
 
-    paths: Sequence[str]
-    format: str | None
-    certify: bool
-    family: str | None
-    strict: bool
-    skip_others: bool
-    settings: Sequence[str]
-    jobs: str
-    scheduler: str | None
-    no_cache: bool
-    gap: str
-    budget: str | None
+    Nothing is written but the findings; what files are found to be is remembered, so that a file that has not
+    changed costs nothing.
+    """
+    if how.json and format_ not in (None, "json"):
+        refuse("--format", "", "--json and --format exclude each other")
+    if family is not None and set_:
+        refuse("--set", "", "--set is not for plans of a family", "leave --family or --set out")
+    from tubecert.checking import CheckOptions
+    from tubecert.cli.guard import write_stdout
+    from tubecert.report import github
+    from tubecert.report.terminal import Terminal
 
-
-def run(given: Given, output: Output) -> ExitCode:
-    """Check every file, or against a family of plans; findings are the result and go to stdout."""
-    format_ = _format(given, output)
-    jobs, options = _options(given)
-    paths = given.paths
-    if given.family is None:
-        files, others = _sorted_out(list(_expand(paths)), {*paths} - {*_folders(paths)}, given.skip_others)
-        executor = _executor(given.scheduler, jobs, len(files))
-        # on a cluster files are known by their places in the file system, not by where the command runs
-        files = files if given.scheduler is None else [str(Path(file).resolve()) for file in files]
-        results = _checked(files, options, executor, output) if files else []
-        results = [*results, *_skipped(others)] or _nothing(paths)
-    elif given.settings:
-        raise refused("--set is not for plans of a family", "leave --family or --set out")
+    if family is not None:
+        results = _members(specs, family)
     else:
-        results = _of_family(paths, given.family)
-    write_stdout(FORMATS[format_](results, Terminal.stdout(color=output.color), quiet=output.quiet))
+        files, others = _sorted_out(list(_expand(specs)), {*specs} - {*_folders(specs)}, skip_others)
+        # on a cluster files are known by their places in the file system, not by where the command runs
+        files = files if scheduler is None else [str(Path(file).resolve()) for file in files]
+        asked: dict[str, Any] = {} if budget is None else {"budget": budget}
+        options = CheckOptions(
+            certify=certify, strict=strict, cached=not no_cache, settings=tuple(set_), gap=gap, **asked
+        )
+        executor = _executor(scheduler, jobs, len(files))
+        results = _checked(files, options, executor, how) if files else []
+        results = [*results, *_skipped(others)] or _nothing(specs)
+    chosen = format_ or ("json" if how.json else "github" if github.detected() else "text")
+    write_stdout(FORMATS[chosen](results, Terminal.stdout(color=how.color), quiet=how.quiet))
     keeper.tell({"said": True})
-    if format_ == "github":
-        from tubecert.report import github
-
+    if chosen == "github":
         github.append_step_summary(results)
     return max((result.code for result in results), key=_WORST.index)
-
-
-def _of_family(paths: Sequence[str], family: str) -> list[Checked]:
-    """The results for plans: whether they belong to a family."""
-    from tubecert.cli.members import members
-
-    return members(paths, family)
-
-
-def _format(given: Given, output: Output) -> str:
-    """The format asked for; in a workflow of GitHub, without being asked, the one that it understands."""
-    if given.format is not None:
-        return given.format
-    from tubecert.report import github
-
-    if output.json:
-        return "json"
-    return "github" if github.detected() else "text"
-
-
-def _options(given: Given) -> tuple[int, CheckOptions]:
-    """The number of jobs and what a check has to know; raises `SpecError` with everything that is wrong."""
-    from tubecert.checking import CheckOptions
-
-    numbers = Numbers()
-    jobs = numbers.count("--jobs", given.jobs)
-    gap = numbers.positive("--gap", given.gap, below=1)
-    budget = numbers.count("--budget", given.budget)
-    numbers.check()
-    options = CheckOptions(
-        certify=given.certify,
-        strict=given.strict,
-        cached=not given.no_cache,
-        settings=settings_of(given.settings),
-    )
-    options = replace(options, gap=gap or options.gap, budget=budget or options.budget)
-    return jobs or 1, options
 
 
 def _folders(paths: Sequence[str]) -> list[str]:
@@ -126,7 +118,6 @@ def _sorted_out(files: list[str], named: set[str], skip_others: bool) -> tuple[l
 
 def _is_specification(file: str) -> bool:
     """Whether a YAML file has a key that every specification has; what cannot be read is left to the check to tell."""
-    from tubecert.errors import TubecertError
     from tubecert.files import read
     from tubecert.spec.source import SPECIFICATION
 
@@ -139,6 +130,7 @@ def _is_specification(file: str) -> bool:
 def _skipped(others: Sequence[str]) -> list[Checked]:
     """What was left alone is said, once."""
     from tubecert.checking import Checked
+    from tubecert.findings import Finding, Severity
 
     if not others:
         return []
@@ -147,9 +139,7 @@ def _skipped(others: Sequence[str]) -> list[Checked]:
     finding = Finding(
         code="TC123",
         severity=Severity.NOTE,
-        message=f"{what} and was left alone: {shown}"
-        if len(others) == 1
-        else f"{what} and were left alone: {shown}",
+        message=f"{what} and {'was' if len(others) == 1 else 'were'} left alone: {shown}",
         help="a specification has the keys tubecert, system and safe_set",
     )
     return [Checked(path=others[0], findings=(finding,), code=ExitCode.CERTIFIED)]
@@ -158,6 +148,7 @@ def _skipped(others: Sequence[str]) -> list[Checked]:
 def _nothing(paths: Sequence[str]) -> list[Checked]:
     """What there is to say where there is nothing to check."""
     from tubecert.checking import Checked
+    from tubecert.findings import Finding
 
     finding = Finding(
         code="TC100",
@@ -175,18 +166,17 @@ def _executor(scheduler: str | None, jobs: int, files: int) -> Executor:
     return chosen(jobs, files) if scheduler is None else cluster_at(scheduler)
 
 
-def _checked(
-    files: Sequence[str], options: CheckOptions, executor: Executor, output: Output
-) -> list[Checked]:
+def _checked(files: Sequence[str], options: CheckOptions, executor: Executor, how: Output) -> list[Checked]:
     """The results in the order of the files, whichever is ready first."""
     from functools import partial
 
     from tubecert.checking import check
+    from tubecert.cli import telling
     from tubecert.executor import Serial
+    from tubecert.progress import Phase
     from tubecert.report import progress
 
-    terminal = Terminal.stderr(color=output.color)
-    with telling.shown(terminal, output) as report:
+    with telling.shown(how) as report:
         told = None if report is None else progress.Pieces(report, Phase.CHECK, len(files))
 
         def ready(place: int, checked: Checked) -> None:
@@ -201,40 +191,34 @@ def _checked(
 
 
 def _as_text(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
+    from tubecert.report.findings import render, summary
+
     findings = [item for result in results for item in result.findings]
     return terminal.text(render(() if quiet else findings, closing=summary(findings, len(results))))
 
 
 def _as_json(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
+    from tubecert.printable import printable_json
+    from tubecert.records import to_json
+    from tubecert.report.findings import as_data
+
     data = [to_json(as_data(item)) for result in results for item in result.findings]
     return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
 
 
-def _as_github(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
-    from tubecert.report import github
+def _as_report(name: str) -> Any:
+    """What the module of that name in `report` makes of results."""
 
-    return github.render(results)
+    def rendered(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
+        from importlib import import_module
 
+        text: str = import_module(f"tubecert.report.{name}").render(results)
+        return text
 
-def _as_junit(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
-    from tubecert.report import junit
-
-    return junit.render(results)
-
-
-def _as_sarif(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
-    from tubecert.report import sarif
-
-    return sarif.render(results)
+    return rendered
 
 
-FORMATS: Final = {
-    "text": _as_text,
-    "json": _as_json,
-    "github": _as_github,
-    "junit": _as_junit,
-    "sarif": _as_sarif,
-}
+FORMATS: Final = {"text": _as_text, "json": _as_json, **{name: _as_report(name) for name in _FORMATS[2:]}}
 
 
 def _expand(paths: Sequence[str]) -> Iterator[str]:
@@ -259,3 +243,37 @@ def _below(folder: Path) -> list[str]:
         and file.resolve().is_relative_to(root)
         and not any(part.startswith(".") for part in file.relative_to(folder).parts)
     )
+
+
+def _members(paths: Sequence[str], family: str) -> list[Checked]:
+    """What there is to say of each plan: a CSV file, or a specification whose trajectory it is."""
+    from tubecert.findings import Finding
+    from tubecert.library.reading import read
+    from tubecert.printable import visible
+    from tubecert.spec import load, load_text
+
+    certified = Path(family).suffix.lower() == ".json"
+    spec = load_text(read(family).effective.text, family) if certified else load(family)
+    if spec.trajectory.bundle is None:
+        message = f"{visible(family)} is about one plan, not about a family"
+        help = "a family has trajectory: {kind: any, x: {...}, u: {...}}"
+        raise SpecError([Finding(code="TC411", message=message, help=help)])
+    return [_member(path, spec) for path in paths]
+
+
+def _member(path: str, family: Spec) -> Checked:
+    from tubecert.checking import Checked
+    from tubecert.findings import Severity
+    from tubecert.pipeline.membership import NO_MEMBER, UNDECIDED, member_spec, membership
+    from tubecert.printable import visible
+
+    try:
+        findings = membership(member_spec(path, family), family, visible(path))
+    except TubecertError as error:
+        return Checked(path=path, findings=error.findings, code=error.exit_code)
+    codes = {item.code for item in findings if item.severity is Severity.ERROR}
+    code = ExitCode.CERTIFIED
+    if codes:
+        code = ExitCode.NOT_CERTIFIED if NO_MEMBER in codes else ExitCode.UNDECIDED
+    assert codes <= {NO_MEMBER, UNDECIDED}
+    return Checked(path=path, findings=tuple(findings), code=code)

@@ -3,30 +3,57 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
 
-from tubecert import certificate
-from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Output
-from tubecert.cli.presenting import present
-from tubecert.cli.targets import refused, spare
-from tubecert.files import STDIN
-from tubecert.library.comparing import FORMATS, REMEDY, compare, ending_of
-from tubecert.report.comparison import page_of
+from tubecert.asking import Choice, Text, refuse
+from tubecert.cli.adapter import CERTIFICATE, Output, command
+
+_AFTER = """\b
+Examples:
+  tubecert compare before.certificate.json after.certificate.json
+  tubecert compare old.json new.json --format markdown > comment.md
+  tubecert compare study.sweep/points/*.certificate.json --format csv
+  tubecert compare a.json b.json c.json -o page.html
+
+\b
+Exit codes: 0 the certificates were compared, whatever they say; 2 one of them cannot be read.
+"""
+_FILES = "A page or a table: FILE.html (with figures), FILE.md, FILE.csv or FILE.json; may be repeated."
+_WORDS: Final = {
+    "certificates": replace(CERTIFICATE, help="Certificates, two or more.", metavar="CERT...", many=True),
+    "format_": Choice(
+        "What to write on stdout; markdown is for pull requests.", words=("text", "markdown", "csv", "json")
+    ),
+    "output": Text(_FILES, "FILE", short="-o", many=True),
+}
 
 
-def run(paths: Sequence[str], format_: str, targets: Sequence[str], output: Output) -> None:
-    """Compare, write what was asked for. Raises `TargetError` for a certificate that cannot be read."""
-    if list(paths).count(STDIN) > 1:
+@command(_WORDS, short="Put certificates side by side.", after=_AFTER)
+def compare(
+    how: Output, certificates: Sequence[str], *, format_: str = "text", output: Sequence[str] = ()
+) -> None:
+    """Put gains, tubes and margins of certificates side by side, and name what differs in their specifications."""
+    if how.json and format_ not in ("text", "json"):
+        refuse("--format", "", "--json and --format exclude each other")
+    from tubecert import certificate
+    from tubecert.cli.guard import write_stdout
+    from tubecert.cli.telling import present, refused, spare
+    from tubecert.files import STDIN
+    from tubecert.library import comparing
+    from tubecert.report.comparison import page_of
+
+    if certificates.count(STDIN) > 1:
         raise refused("- is given twice: one certificate can be on stdin", "give files")
-    for target in targets:
-        ending_of(target)
-        certificate.check_target(target, REMEDY)
-        spare(target, {f"certificate {path}": path for path in paths if path != STDIN})
-    comparison = compare(*paths)
-    for target in targets:
+    for target in output:
+        comparing.ending_of(target)
+        certificate.check_target(target, comparing.REMEDY)
+        spare(target, {f"certificate {path}": path for path in certificates if path != STDIN})
+    comparison = comparing.compare(*certificates)
+    for target in output:
         comparison.save(target)
-    if format_ == "text":
-        written = [*(("page", target) for target in targets), ("more", "-v here; -o FILE.html")]
-        present(output, page_of(comparison.sides), written)
-    else:
-        write_stdout(FORMATS[f".{format_}"](comparison))
+    if how.json or format_ != "text":
+        write_stdout(comparing.FORMATS[".json" if how.json else f".{format_}"](comparison))
+        return
+    written = [*(("page", target) for target in output), ("more", "-v here; -o FILE.html")]
+    present(how, page_of(comparison.sides), written)

@@ -4,15 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from tubecert.asking import Text
+from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.errors import SpecError
-from tubecert.expression import near
-from tubecert.findings import Finding
-from tubecert.report import pages
+
+_AFTER = """\b
+Examples:
+  tubecert explain TC302
+  tubecert explain feedback_gain
+  tubecert explain 26c
+"""
+_TOPIC = Text("A code, a constant or an equation.", "TOPIC", place=True, optional=True)
 
 
-def run(topic: str | None) -> None:
-    """Show the page of a topic, or every topic; raises `SpecError` if there is no such page."""
+@command({"topic": _TOPIC}, short="Explain a code, a constant, an equation.", after=_AFTER, shared=("debug",))
+def explain(how: Output, topic: str | None = None) -> None:
+    """Explain a finding code, a constant or an equation; without a topic, list all that there are."""
+    from tubecert.expression import near
+    from tubecert.findings import Finding
+    from tubecert.report import pages
+
     if topic is None:
         write_stdout("\n".join(_index()) + "\n")
         return
@@ -25,6 +37,8 @@ def run(topic: str | None) -> None:
 
 
 def _index() -> Iterator[str]:
+    from tubecert.report import pages
+
     yield "Words of reports"
     yield from (f"  {word:<16} {page.title}" for word, page in pages.words().items())
     yield "\nFinding codes"

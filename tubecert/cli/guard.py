@@ -17,18 +17,13 @@ from tubecert.printable import printable_lines
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tubecert.cli.options import Output
+    from tubecert.cli.adapter import Output
 
 
 @contextlib.contextmanager
-def guarded(output: Output, deadline: str | None = None) -> Iterator[None]:
-    """Turns whatever the block raises into `typer.Exit` with the right code, having told the user.
-
-    `deadline`: of a command that does not look at the time itself.
-    """
+def guarded(output: Output) -> Iterator[None]:
+    """Turns whatever the block raises into `typer.Exit` with the right code, having told the user."""
     try:
-        if deadline is not None:
-            _end_after(deadline)
         yield
     except typer.Exit:
         raise
@@ -55,18 +50,6 @@ def guarded(output: Output, deadline: str | None = None) -> Iterator[None]:
         raise typer.Exit(ExitCode.INTERNAL) from None
 
 
-def _end_after(deadline: str) -> None:
-    """Has the command interrupted so many seconds after it was started; raises `SpecError` for what is no number."""
-    from tubecert.cli import keeper
-    from tubecert.library.numbers import Numbers
-
-    numbers = Numbers()
-    seconds = numbers.positive("--deadline", deadline)
-    numbers.check()
-    if seconds is not None:
-        keeper.left_of(float(seconds), interrupted=True)
-
-
 def show(error: TubecertError, output: Output) -> None:
     """The findings of an error on stderr."""
     from tubecert.report.findings import render
@@ -82,9 +65,7 @@ def refuse_usage(error: Any) -> int:
     text = StringIO()
     error.show(file=text)
     hint = usage_hint(error, sys.argv[1:])
-    said = text.getvalue()
-    for jargon, plain in _PLAIN:
-        said = said.replace(jargon, plain)
+    said = text.getvalue().replace("Value error, ", "")  # jargon of a library
     _tell_as_is(printable_lines(said + hint).rstrip("\n"))
     return int(error.exit_code)
 
@@ -108,15 +89,6 @@ def usage_hint(error: Exception, words: Sequence[str]) -> str:
 
 
 _UNIT: Final = re.compile(r"\) \((rad/s|1/s|Hz|kHz|s|ms|m|rad|deg|sec)\)")
-_PLAIN: Final = (
-    ("Value error, ", ""),
-    ("Input should be a valid integer, unable to parse string as an integer", "it is not a whole number"),
-    ("Input should be greater than or equal to", "it must be at least"),
-    ("Input should be less than or equal to", "it must be at most"),
-    ("Input should be", "it must be"),
-)
-"""What a library says of a value, and what is said here."""
-
 _GONE: Final[Mapping[str, str]] = {
     "design": "the narrowest tube for a machine is withdrawn until the sampled loop has a certificate of its own; "
     "tubecert sweep tries widths, e.g. --over tube.half_widths.x1=0.1:0.5:5",

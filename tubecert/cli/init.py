@@ -2,48 +2,78 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Final
 
-from tubecert import certificate
-from tubecert.cli.guard import write_stdout
-from tubecert.cli.targets import refused
+from tubecert.asking import Choice, Flag, Text, refuse
+from tubecert.cli.adapter import Output, command
 from tubecert.errors import TargetError
-from tubecert.printable import visible
 
-_BESIDE: Final[Mapping[str, tuple[str, ...]]] = {"csv": ("plan.csv",)}
-"""Files that a template needs beside it."""
+_BESIDE: Final = {"csv": ("plan.csv",)}  # files that a template needs beside it
+_AFTER = """\b
+Example:
+  tubecert init plant.yaml --template tracking && tubecert certify plant.yaml
+"""
+TEMPLATES: Final = (
+    "regulation", "tracking", "machine", "pvtol", "car", "crane", "arm2", "quadrotor", "csv",
+)  # fmt: skip
+_WORDS: Final = {
+    "file": Text("The new file; - is stdout.  [TEMPLATE.yaml]", "FILE", place=True, optional=True),
+    "template": Choice("What to start from.", short="-t", words=TEMPLATES),
+    "output": Text("The same as FILE.", "FILE", short="-o"),
+    "quiet": Flag("Say nothing.", short="-q"),
+}
 
 
-def run(template: str, target: str | None, *, quiet: bool) -> None:
-    """Write a template to a file that does not exist yet (`-`: to stdout); raises `TargetError`."""
+@command(_WORDS, short="Write a specification to start from.", after=_AFTER, shared=("debug",))
+def init(
+    how: Output,
+    file: str | None = None,
+    *,
+    template: str = "regulation",
+    output: str | None = None,
+    quiet: bool = False,
+) -> None:
+    """Write a commented specification to start from; it certifies as it is. Nothing is overwritten."""
+    from tubecert import certificate
+    from tubecert.cli.guard import write_stdout
+    from tubecert.cli.telling import refused
+    from tubecert.printable import visible
+
+    if file is not None and output is not None:
+        refuse("--output", "", f"FILE and --output name the same: give {file} or {output}")
+    if file in TEMPLATES:
+        refuse("FILE", "", f"{file} is a template: write --template {file}")
+    target = output if file is None else file
     if target is not None and target != certificate.STDOUT and not Path(target).suffix:
         raise refused(f"{target} has no suffix", f"write tubecert init {target}.yaml")
     text = _text(f"{template}.yaml")
     if target == certificate.STDOUT:
         write_stdout(text)
         return
-    name = f"{template}.yaml" if target is None else target
+    name = target or f"{template}.yaml"
     text = text.replace(f"tubecert certify {template}.yaml", _command(name))
-    beside = [(str(Path(name).with_name(file)), _text(file)) for file in _BESIDE.get(template, ())]
-    for file, _ in beside:
-        if Path(file).exists():
-            raise _refused(f"{file} exists and is not overwritten")
-    _create(name, text)
-    for file, content in beside:
-        _create(file, content)
+    beside = {str(Path(name).with_name(each)): _text(each) for each in _BESIDE.get(template, ())}
+    for each in beside:
+        if Path(each).exists():
+            raise _refused(f"{each} exists and is not overwritten")
+    for each, content in {name: text, **beside}.items():
+        _create(each, content)
     if not quiet:
         write_stdout(f"{visible(name)}: a specification that certifies as it is\n  {_command(name)}\n")
 
 
 def _text(file: str) -> str:
+    from importlib import resources
+
     return (resources.files("tubecert") / "templates" / file).read_text(encoding="utf-8")
 
 
 def _command(name: str) -> str:
+    import shlex
+
+    from tubecert.printable import visible
+
     return f"tubecert certify {visible(shlex.quote(name))}"
 
 
@@ -60,4 +90,6 @@ def _create(name: str, text: str) -> None:
 
 
 def _refused(message: str) -> TargetError:
+    from tubecert.cli.telling import refused
+
     return refused(message, "choose another file: tubecert init FILE")

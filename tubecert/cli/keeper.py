@@ -92,12 +92,12 @@ def tell(news: News) -> None:
 
 
 def left_of(seconds: float, *, interrupted: bool = False) -> float:
-    """How many of the seconds that a command was given since it was started are left; it is ended soon after.
+    """How many of the seconds that a command was given since it was started are left, at least 1 ms; then it is ended.
 
     `interrupted`: it does not look at the time itself.
     """
     tell({"seconds": seconds, "interrupted": interrupted})
-    return seconds - (time.monotonic() - _began) if told_to() else seconds
+    return max(1e-3, seconds - (time.monotonic() - _began)) if told_to() else seconds
 
 
 class Keeper:

@@ -4,83 +4,64 @@ from __future__ import annotations
 
 import json
 import shlex
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
 
-from tubecert.certificate.file import FORMAT, parse
-from tubecert.cli import keeper, telling
-from tubecert.cli.options import Output
-from tubecert.cli.presenting import present
+from tubecert.asking import asked_by, words_of
+from tubecert.cli import keeper
+from tubecert.cli.adapter import CERTIFICATE, Output, command
 from tubecert.errors import ExitCode
-from tubecert.library.numbers import Numbers
-from tubecert.library.rechecking import text_of, told, with_controller
-from tubecert.printable import printable_json
-from tubecert.recheck import document
-from tubecert.recheck.run import BUDGET, Examined, Recheck, recheck
-from tubecert.report.rechecked import page_of
-from tubecert.sampled_loop.record import FORMAT as SAMPLED
+from tubecert.library import rechecking
+
+if TYPE_CHECKING:
+    from tubecert.library.rechecking import Rechecked
+    from tubecert.recheck.run import Examined
+
+_AFTER = """\b
+Examples:
+  tubecert recheck plant.certificate.json
+  tubecert recheck plant.certificate.json --spec plant.yaml
+  tubecert recheck plant.certificate.json --controller plant.controller
+  tubecert recheck plant.certificate.json --json | jq .first_failing
+
+\b
+Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, or it says refuted; 2 no
+certificate, or one of another specification; 4 a claim could not be decided, or it says undecided.
+"""
+_WORDS: Final = {
+    "certificate": replace(CERTIFICATE, help="A certificate (JSON); - is stdin."),
+    **words_of(rechecking.recheck),
+}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Given:
-    """What the command line says, as texts."""
+@command(_WORDS, short="Verify a certificate in a second arithmetic.", after=_AFTER)
+def recheck(how: Output, certificate: str, **asked: Any) -> ExitCode:
+    """Verify every claim of a certificate again: in ball arithmetic, with derivatives of its own, without a solver."""
+    if seconds := asked.get("deadline"):
+        asked["deadline"] = keeper.left_of(float(seconds))
+    from tubecert.cli import telling
 
-    certificate: str
-    spec: str | None
-    budget: str | None
-    deadline: str | None
-    controller: str | None = None
+    def heard(item: Examined) -> None:
+        why = "" if item.outcome.holds else f": {item.outcome.why}"
+        telling.found(f"{item.outcome.verdict:<12}  {item.name}{why}")
 
-
-def run(given: Given, output: Output) -> ExitCode:
-    """Recheck a certificate; with a specification, also whether it belongs to it."""
-    numbers = Numbers()
-    budget = numbers.count("--budget", given.budget)
-    seconds = numbers.positive("--deadline", given.deadline)
-    numbers.check()
-    limit = None if seconds is None else keeper.left_of(float(seconds))
-    name = given.certificate
-    text = text_of(name)
-    note = "" if given.spec is None else _specification(given.spec, text, name)
-    from tubecert.report.terminal import Terminal
-
-    terminal = Terminal.stderr(color=output.color)
-    with telling.shown(terminal, output) as show:
-        report, most = None if show is None else told(show), BUDGET if budget is None else budget
-        found = recheck(text, name, most, report, seconds=limit, heard=_heard)
-    if given.controller is not None:
-        found = with_controller(found, text, name, given.controller)
-    data = _as_json(found, name, note) if output.json else None
-    present(replace(output, quiet=output.quiet or output.json), page_of(found, name, note), _next(name), data)
-    return found.exit_code
+    with telling.shown(how) as progress, asked_by(heard=heard):
+        found = rechecking.recheck(certificate, **asked, progress=progress)
+    data = _as_json(found) if how.json else None
+    told = f"-v here; tubecert report {shlex.quote(certificate)}: what is certified, as a page with figures"
+    telling.present(replace(how, quiet=how.quiet or how.json), found._page(), [("more", told)], data)
+    return found.found.exit_code
 
 
-def _next(name: str) -> list[tuple[str, str]]:
-    return [
-        ("more", f"-v here; tubecert report {shlex.quote(name)}: what is certified, as a page with figures")
-    ]
+def _as_json(found: Rechecked) -> str:
+    from tubecert.printable import printable_json
 
-
-def _heard(item: Examined) -> None:
-    why = "" if item.outcome.holds else f": {item.outcome.why}"
-    telling.found(f"{item.outcome.verdict:<12}  {item.name}{why}")
-
-
-def _specification(path: str, text: str, name: str) -> str:
-    """A sentence that says that the certificate is of a specification; raises TC604 if it is not."""
-    from tubecert.cli.belonging import belongs, sampled_belongs
-
-    if parse(text.encode(), name, (FORMAT, SAMPLED))["format"] == SAMPLED:
-        return sampled_belongs(text, name, path)
-    return belongs(document.read(text, name), name, path)
-
-
-def _as_json(found: Recheck, name: str, note: str) -> str:
-    failing = found.failing
+    failing = found.first_failing
     data = {
-        "certificate": name,
+        "certificate": found.name,
         "verdict": found.verdict,
-        "stated": found.stated,
-        "hash": found.hash,
+        "stated": found.found.stated,
+        "hash": found.found.hash,
         "claims": [
             {
                 "claim": item.name,
@@ -91,7 +72,7 @@ def _as_json(found: Recheck, name: str, note: str) -> str:
             for item in found.claims
         ],
         "first_failing": None if failing is None else failing.name,
-        "not_examined": list(found.unread),
-        **({"specification": note} if note else {}),
+        "not_examined": list(found.found.unread),
+        **({"specification": found.belongs} if found.belongs else {}),
     }
     return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"

@@ -5,60 +5,75 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
-from tubecert import certificate
-from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Output
-from tubecert.cli.targets import refused
-from tubecert.errors import TargetError
-from tubecert.files import STDIN
-from tubecert.library.pages import REMEDY, Report, require_page, simulated_in
-from tubecert.library.reading import read
-from tubecert.printable import printable_json, visible
-from tubecert.report.claimed import NOT_RECHECKED
+from tubecert.asking import Text, words_of
+from tubecert.cli.adapter import CERTIFICATE, Output, command
+from tubecert.library import pages
 
 if TYPE_CHECKING:
-    from tubecert.report.page_simulation import Simulated
     from tubecert.report.quantities import AnyCertificate
 
+_AFTER = """\b
+Examples:
+  tubecert report plant.certificate.json
+  tubecert report plant.certificate.json -o plant.html -o plant.md
+  tubecert report plant.certificate.json --simulation plant.simulation
+"""
+_FILES: Final = "The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]"
+_WORDS: Final = {
+    "certificate": CERTIFICATE,
+    "output": Text(_FILES, "FILE", short="-o", many=True),
+    **words_of(pages.report),
+}
 
-def run(source: str, targets: Sequence[str] | None, simulation: str | None, output: Output) -> None:
-    """Write the pages of the certificate in `source`, with the figures in a folder of `simulate`.
 
-    Raises `TargetError`.
-    """
-    if source == STDIN and not targets:
+@command(_WORDS, short="Make a page from a certificate.", after=_AFTER)
+def report(how: Output, certificate: str, *, output: Sequence[str] = (), **asked: Any) -> None:
+    """Make a page from a certificate, without certifying anything again."""
+    from tubecert.cli.guard import write_stdout
+    from tubecert.cli.telling import refused
+    from tubecert.files import STDIN
+    from tubecert.library.reading import read
+    from tubecert.printable import printable_json, visible
+    from tubecert.report.claimed import NOT_RECHECKED
+
+    if certificate == STDIN and not output:
         raise refused("a certificate on stdin has no name that the page could have", "give -o FILE.html")
-    pages = list(targets) if targets else [_beside(source)]
-    check_pages(pages, {"certificate": source})
-    told = read(source).certificate
-    write_pages(pages, told, None if simulation is None else simulated_in(simulation, told))
-    if output.json:
-        write_stdout(printable_json(json.dumps({"pages": pages}, ensure_ascii=False)) + "\n")
-    elif not output.quiet:
-        write_stdout("".join(f"page {visible(page)}\n" for page in pages) + f"{NOT_RECHECKED}\n")
+    targets = list(output) or [_beside(certificate)]
+    check_pages(targets, {"certificate": certificate})
+    page = pages.report(read(certificate), **asked)
+    for target in targets:
+        page.save(target)
+    if how.json:
+        write_stdout(printable_json(json.dumps({"pages": targets}, ensure_ascii=False)) + "\n")
+    elif not how.quiet:
+        write_stdout("".join(f"page {visible(target)}\n" for target in targets) + f"{NOT_RECHECKED}\n")
 
 
-def check_pages(pages: Sequence[str], taken: Mapping[str, str | Path | None]) -> None:
+def check_pages(targets: Sequence[str], taken: Mapping[str, str | None]) -> None:
     """Raise `TargetError` now for a page that cannot be written, or would take the place of another file.
 
     `taken` says which files must stay what they are.
     """
+    from tubecert import certificate
+    from tubecert.cli.telling import refused
+
     kept = {what: path for what, path in taken.items() if path is not None}
-    for page in pages:
-        require_page(page)
-        certificate.check_target(page, REMEDY)
+    for page in targets:
+        pages.require_page(page)
+        certificate.check_target(page, pages.REMEDY)
         for what, path in kept.items():
             if Path(path).resolve() == Path(page).resolve() or certificate.same_file(page, path):
-                raise _refused(page, f"it is the {what} itself", "choose another file for the page")
+                message = f"cannot write {page}: it is the {what} itself"
+                raise refused(message, "choose another file for the page")
         kept[f"page {page}"] = page
 
 
-def write_pages(pages: Sequence[str], sealed: AnyCertificate, simulated: Simulated | None = None) -> None:
+def write_pages(targets: Sequence[str], sealed: AnyCertificate) -> None:
     """Write the pages of a certificate. Raises `TargetError`."""
-    for page in pages:
-        Report(certificate=sealed, simulated=simulated).save(page)
+    for page in targets:
+        pages.Report(certificate=sealed).save(page)
 
 
 def _beside(source: str) -> str:
@@ -66,7 +81,3 @@ def _beside(source: str) -> str:
     path = Path(source)
     name = path.name.removesuffix(".json").removesuffix(".certificate")
     return str(path.with_name(f"{name or 'certificate'}.html")) if path.name else source
-
-
-def _refused(page: str, why: str, remedy: str) -> TargetError:
-    return refused(f"cannot write {page}: {why}", remedy)

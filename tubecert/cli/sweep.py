@@ -4,70 +4,81 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from tubecert import pipeline
-from tubecert.cli import telling
-from tubecert.cli.options import Output, flag
-from tubecert.cli.presenting import present
-from tubecert.cli.settings import settings_of
+from tubecert.asking import Text, refuse, words_of
+from tubecert.cli.adapter import ENDING, SET, SPEC, Output, command
 from tubecert.errors import ExitCode
-from tubecert.library.numbers import Numbers
-from tubecert.library.sweeping import Swept, axes_of, swept
-from tubecert.library.workers import cluster_at
-from tubecert.printable import printable_json
-from tubecert.records import exact_json
-from tubecert.report import sweep as told
-from tubecert.report.terminal import Terminal
-from tubecert.spec.source import read_source
-from tubecert.sweep.point import Task
+from tubecert.library import sweeping
 
 if TYPE_CHECKING:
-    from tubecert.report.quantities import Value
-    from tubecert.report.sweep import SweepTable
+    from tubecert.library.sweeping import Swept
+    from tubecert.spec import Setting
 
 _PAGE: Final = "sweep.html"
+_AFTER = """\b
+Examples:
+  tubecert sweep plant.yaml --over tube.epsilon=.1:.6:6
+  tubecert sweep plant.yaml --over tube.epsilon=.1:.6:6 --over metric.rate=.5:2:log5 --jobs 4
+  tubecert sweep plant.yaml --over conditions.decides=0,A,B --set tube.rho_a=0.2 -o study
+
+\b
+A range is FIRST:LAST:COUNT (equal steps), FIRST:LAST:logCOUNT (equal factors), or VALUE,VALUE,...; several
+make a grid. Every point is certified as tubecert certify --set ... does it, and kept in a file of its own:
+the same command goes on with a sweep that was interrupted. docs/sweep.md says what the folder holds.
+
+\b
+Exit codes: 0 every point has its row, whatever its verdict; 2 invalid input, or no point has a valid
+specification; 3 an internal error at a point (its row says so); 130 interrupted.
+"""
+_WORDS: Final = {
+    "spec": SPEC,
+    "over": Text("A key and its values; may be repeated.", "KEY=RANGE", many=True),
+    "set_": SET,
+    **words_of(sweeping.sweep),
+    "deadline": ENDING,
+    "output": Text("Points, table, figures.  [SPEC's stem.sweep]", "FOLDER", short="-o"),
+}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Given:
-    """What the command line says, as texts."""
+@command(_WORDS, short="Certify a grid of keys: table, curves, heat maps.", after=_AFTER)
+def sweep(
+    how: Output,
+    spec: str,
+    *,
+    over: Sequence[str] = (),
+    set_: Sequence[Setting] = (),
+    output: str | None = None,
+    **asked: Any,
+) -> ExitCode:
+    """Certify every point of a grid of keys of a specification; a table, curves, heat maps."""
+    if not over:
+        refuse(
+            "--over",
+            "",
+            "--over says which keys have which values",
+            "for example --over tube.epsilon=.1:.6:6",
+        )
+    from tubecert.cli import telling
+    from tubecert.cli.telling import present
+    from tubecert.printable import printable_json
+    from tubecert.records import exact_json
+    from tubecert.report import sweep as told
 
-    spec: str
-    over: Sequence[str]
-    settings: Sequence[str]
-    metric: Path | None
-    conditions: str | None
-    gap: str
-    budget: str | None
-    jobs: str
-    scheduler: str | None
-    parquet: bool
-    folder: str | None
-
-
-def run(given: Given, output: Output) -> ExitCode:
-    """Certify what is missing, then make the table of all."""
-    numbers = Numbers()
-    jobs = numbers.count("--jobs", given.jobs)
-    options = _options(given, numbers)
-    numbers.check()
-    fixed = settings_of(given.settings, metric=given.metric)
-    axes = axes_of(given.over)
-    source = read_source(given.spec)
-    folder = Path(given.folder or f"{Path(given.spec).stem}.sweep")
-    cluster = None if given.scheduler is None else cluster_at(given.scheduler)
-    folder = folder if cluster is None else folder.resolve()
-    task = Task(path=source.file, text=source.text, fixed=fixed, options=options, folder=folder)
-    terminal = Terminal.stderr(color=output.color)
-    with telling.shown(terminal, output) as report:
-        found = swept(task, axes, cluster, jobs or 1, report, parquet=given.parquet, named=flag)
-    table = found.table
-    data = printable_json(json.dumps(_rows(table), indent=1, ensure_ascii=False)) + "\n"
-    present(output, told.page_of(table), _files(found), data if output.json else None)
+    folder = output or f"{Path(spec).stem}.sweep"
+    with telling.shown(how) as progress:
+        found = sweeping.sweep(spec, over, folder=folder, settings=set_, **asked, progress=progress)
+    table, data = found.table, None
+    if how.json:
+        values = [
+            [exact_json(each) if isinstance(each, Fraction) else each for each in row]
+            for row in table.cells()
+        ]
+        rows = [dict(zip(table.header, row, strict=True)) for row in values]
+        data = printable_json(json.dumps(rows, indent=1, ensure_ascii=False)) + "\n"
+    present(how, told.page_of(table), _files(found), data)
     return ExitCode.INTERNAL if found.broken else ExitCode.CERTIFIED
 
 
@@ -77,24 +88,3 @@ def _files(found: Swept) -> list[tuple[str, str]]:
     drawn = len(found.files) - len(names)
     rows = [("page" if name == _PAGE else "table", str(found.folder / name)) for name in sorted(names)]
     return rows + ([("figures", f"{found.folder / 'figures'}: {drawn} drawings (SVG)")] if drawn else [])
-
-
-def _options(given: Given, numbers: Numbers) -> pipeline.Options:
-    default = pipeline.Options()
-    gap = numbers.positive("--gap", given.gap, below=1)
-    budget = numbers.count("--budget", given.budget)
-    return pipeline.Options(
-        metric=given.metric,
-        conditions=given.conditions,
-        gap=gap or default.gap,
-        budget=budget or default.budget,
-    )
-
-
-def _rows(table: SweepTable) -> list[dict[str, float | str | None]]:
-    """The rows as JSON."""
-    return [dict(zip(table.header, map(_json, cells), strict=True)) for cells in table.cells()]
-
-
-def _json(value: Value) -> float | str | None:
-    return exact_json(value) if isinstance(value, Fraction) else value

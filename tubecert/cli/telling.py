@@ -1,26 +1,33 @@
-"""What a command tells while it works: to who looks at it, and to who keeps it for an end that comes from outside."""
+"""What a command tells: to who looks at it, to who keeps it for an end that comes from outside; and where it writes."""
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tubecert import certificate
 from tubecert.claims.family import Reason
 from tubecert.cli import keeper
-from tubecert.cli.options import Output
+from tubecert.cli.guard import write_stdout
 from tubecert.digits import exact, short
+from tubecert.errors import TargetError
+from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.progress import Phase, Progress, Step
 from tubecert.report import progress
+from tubecert.report.terminal import Terminal
 from tubecert.words.progress import came_to, described, next_step, out_of_reach
 
 if TYPE_CHECKING:
     from tubecert.certificate.metric_file import MetricFile
+    from tubecert.cli.adapter import Output
     from tubecert.pipeline.synthesised import Row, Synthesised
-    from tubecert.report.terminal import Terminal
+    from tubecert.report.page import Page
+    from tubecert.report.text import Rows
     from tubecert.spec import Spec
 
 _EVERY: Final = 0.2  # s between two of the same search
@@ -28,9 +35,10 @@ _CLAIMS: Final = (Phase.CERTIFICATION, Phase.GAINS)  # each name is one, and is 
 
 
 @contextlib.contextmanager
-def shown(terminal: Terminal, output: Output) -> Iterator[Progress | None]:
+def shown(how: Output) -> Iterator[Progress | None]:
     """A callback of progress: shown unless that is not wanted, and kept; None where nobody hears it."""
-    with progress.shown(terminal, wanted=not (output.no_progress or output.quiet)) as report:
+    terminal = Terminal.stderr(color=how.color)
+    with progress.shown(terminal, wanted=not (how.no_progress or how.quiet)) as report:
         yield Told(report) if keeper.told_to() else report
 
 
@@ -94,18 +102,59 @@ def _judged(row: Row) -> str:
     return f"{words}: {row.verdict}, {Reason(claim=row.claim, verdict=row.verdict).sentence}"
 
 
-def warn_of_size(system: Spec, terminal: Terminal, output: Output) -> None:
+def warn_of_size(system: Spec, how: Output) -> None:
     """Says that a search is out of reach by its size, before it begins."""
     from tubecert.model import build
     from tubecert.synthesis.problem import beyond
 
-    if output.quiet or (size := beyond(build(replace(system, metric=None)))) is None:
+    if how.quiet or (size := beyond(build(replace(system, metric=None)))) is None:
         return
     from rich.text import Text
 
-    terminal.show(Text.assemble(("warning: ", "yellow"), out_of_reach(size)))
+    Terminal.stderr(color=how.color).show(Text.assemble(("warning: ", "yellow"), out_of_reach(size)))
 
 
 def found(line: str) -> None:
     """A result, to be told if the command is ended."""
     keeper.tell({"found": visible(line)})
+
+
+def present(how: Output, page: Page, closing: Rows = (), data: str | None = None) -> None:
+    """Shows the page, then files and next commands (with `--quiet` its headline alone); or writes `data`.
+
+    With `data` the headline is on stderr.
+    """
+    from tubecert.report.text import headline
+
+    write_stdout(text_of(how, page, closing, data))
+    if data is not None and not how.quiet:
+        Terminal.stderr(color=how.color).show(headline(page))
+    keeper.tell({"said": True})
+
+
+def text_of(how: Output, page: Page, closing: Rows, data: str | None = None) -> str:
+    """What `present` writes to stdout."""
+    from tubecert.report.text import headline, screen
+
+    if data is not None:
+        return data
+    shown = [headline(page)] if how.quiet else screen(page, closing, verbose=how.verbose)
+    return Terminal.stdout(color=how.color).text(shown)
+
+
+def refused(message: str, help: str = "choose another file with -o FILE") -> TargetError:
+    """The error about a file that is not written."""
+    return TargetError([Finding(code="TC120", message=message, help=help)])
+
+
+def spare(target: str, inputs: Mapping[str, str | Path | None]) -> None:
+    """Raise `TargetError` for a target that would take the place of an input; `inputs` are named by what they are."""
+    for what, source in inputs.items():
+        if source is not None and target != certificate.STDOUT and certificate.same_file(target, source):
+            raise refused(f"{target} is the {what} itself and would be overwritten")
+
+
+def plan_of(file: str, system: Spec) -> Path | None:
+    """The plan file of the specification in `file`, if it has one."""
+    table = system.trajectory.table
+    return None if table is None else Path(file).parent / table.file

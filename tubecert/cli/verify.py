@@ -3,124 +3,128 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
-from tubecert import certificate
-from tubecert.cli import telling
-from tubecert.cli.guard import write_stdout
-from tubecert.cli.options import Output, flag
-from tubecert.cli.settings import settings_of
-from tubecert.cli.targets import refused, spare
+from tubecert.asking import Flag, Text, words_of
+from tubecert.cli.adapter import ENDING, SET, Output, command
 from tubecert.errors import ExitCode, SpecError, TubecertError
-from tubecert.findings import Finding, Location
-from tubecert.library.asked import at_rate, verification_numbers
-from tubecert.printable import visible
-from tubecert.progress import Phase
-from tubecert.report.terminal import Terminal
+from tubecert.library import metrics
 
 if TYPE_CHECKING:
-    from tubecert.pipeline.verification import Verified
+    from fractions import Fraction
+
+    from tubecert.library.metrics import VerifiedMetric
+    from tubecert.report.terminal import Terminal
     from tubecert.spec import Setting, Spec
 
+_AFTER = """\b
+Examples:
+  tubecert verify plant.yaml
+  tubecert verify plant.yaml metric.json other.mat
+  tubecert verify published/*.yaml --json
+  tubecert verify configs/published/*.yaml --expect
+  tubecert verify plant.yaml coefficients.npz --rate 0.8 -o metric.json
+
+\b
+A file of a specification may lack all but tubecert, name, system, safe_set and metric. Metrics that follow
+it (.json, .csv, .npz, .mat) are decided for its system in place of its own. docs/verify.md has the formats.
+
+\b
+Exit codes: 0 C1-C3 hold for all of them; 1 one is refuted; 2 invalid input; 4 one could not be decided.
+"""
 _METRICS = (".json", ".csv", ".npz", ".mat")
+_WORDS: Final = {
+    "files": Text("Specifications, and metrics after them.", "SPEC|METRIC...", place=True, many=True),
+    "set_": SET,
+    **{name: kind for name, kind in words_of(metrics.verify).items() if name != "metric"},
+    "deadline": ENDING,
+    "output": Text("Write a metric file, if there is one metric and it holds.", "FILE", short="-o"),
+    "expect": Flag("Compare each with the section `expect` of its specification; 0 if all agree."),
+}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
-    """A metric that is decided: the file that it stands in, and the specification with it."""
+@command(_WORDS, short="Decide metrics alone: C1-C3, largest rate.", after=_AFTER)
+def verify(
+    how: Output,
+    files: Sequence[str],
+    *,
+    set_: Sequence[Setting] = (),
+    output: str | None = None,
+    expect: bool = False,
+    **asked: Any,
+) -> ExitCode:
+    """Decide C1, C2, C3 of metrics on their safe sets, without plan, uncertainty or tube."""
+    from tubecert import certificate
+    from tubecert.cli import telling
+    from tubecert.cli.guard import write_stdout
+    from tubecert.cli.telling import refused, spare
+    from tubecert.library.specification import Specification
+    from tubecert.progress import Phase
+    from tubecert.report import progress, text, verification
+    from tubecert.report.terminal import Terminal
 
-    file: str
-    spec: Spec
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Given:
-    """The command line."""
-
-    files: Sequence[str]
-    settings: Sequence[str]
-    rate: str | None
-    gap: str
-    budget: str | None
-    target: str | None
-    expect: bool
-
-
-def run(given: Given, output: Output) -> ExitCode:
-    """Verify every metric."""
-    texts = {"rate": given.rate, "gap": given.gap, "budget": given.budget}
-    numbers = verification_numbers(texts, flag)
-    cases = list(_cases(given.files, numbers.rate, settings_of(given.settings)))
-    target = given.target
-    if target is not None:
+    cases = list(_cases(files, asked.get("rate"), set_))
+    if output is not None:
         if len(cases) != 1:
             raise refused(f"-o takes one metric, and {len(cases)} were given", "verify them one by one")
-        certificate.check_target(target)
-        spare(target, {"input": cases[0].file, "specification": cases[0].spec.path})
-    from tubecert.enclosure.branch_and_bound import Effort
-    from tubecert.pipeline.verification import verify
-    from tubecert.report import progress, text, verification
-
-    effort = Effort(gap=float(numbers.gap), budget=numbers.budget)
-    terminal = Terminal.stderr(color=output.color)
-    shown = Terminal.stdout(color=output.color)
-    found: list[tuple[str, Verified]] = []
-    for case in cases:
-        with telling.shown(terminal, output) as show:
-            told = (
-                None
-                if show is None
-                else progress.Pieces(show, Phase.VERIFICATION, len(cases), done=len(found))
-            )
-            verified = verify(case.spec, effort, told)
-        found.append((case.file, verified))
-        if not output.json:  # one after the other: many metrics take their time
-            page = verification.page_of(case.file, verified)
-            write_stdout(
-                shown.text([text.headline(page)] if output.quiet else text.screen(page, [], verbose=True))
-            )
-    if target is not None and found[0][1].file is not None:
-        certificate.write(target, found[0][1].file.to_json())
-    if output.json:
-        write_stdout(verification.as_json(found))
-    elif not output.quiet:
-        write_stdout(_closing([verified for _, verified in found], target))
-    if given.expect:
-        return _as_locked([case.spec for case in cases], [verified for _, verified in found], terminal)
-    return _code([verified for _, verified in found])
+        certificate.check_target(output)
+        spare(output, {"input": cases[0][0], "specification": cases[0][1].path})
+    terminal, shown = Terminal.stderr(color=how.color), Terminal.stdout(color=how.color)
+    found: list[tuple[str, VerifiedMetric]] = []
+    for file, spec in cases:
+        with telling.shown(how) as show:
+            told = show and progress.Pieces(show, Phase.VERIFICATION, len(cases), done=len(found))
+            metric = metrics.verify(Specification(spec=spec), **asked, progress=told)
+        found.append((file, metric))
+        if not how.json:  # one after the other: many metrics take their time
+            page = verification.page_of(file, metric.found)
+            one = [text.headline(page)] if how.quiet else text.screen(page, [], verbose=True)
+            write_stdout(shown.text(one))
+    if output is not None and found[0][1].proven:
+        found[0][1].save(output)
+    if how.json:
+        write_stdout(verification.as_json([(file, metric.found) for file, metric in found]))
+    elif not how.quiet:
+        write_stdout(_closing([metric for _, metric in found], output))
+    if expect:
+        return _as_locked([spec for _, spec in cases], [metric for _, metric in found], terminal)
+    codes = [metric.verdict.exit_code for _, metric in found]
+    return next((c for c in (ExitCode.NOT_CERTIFIED, ExitCode.UNDECIDED) if c in codes), ExitCode.CERTIFIED)
 
 
-def _closing(found: Sequence[Verified], target: str | None) -> str:
+def _closing(found: Sequence[VerifiedMetric], target: str | None) -> str:
     """How many there are of each verdict, and where a metric was written."""
-    verdicts = [verified.verdict for verified in found]
+    from tubecert.printable import visible
+
+    verdicts = [metric.verdict for metric in found]
     counts = ", ".join(f"{verdicts.count(each)} {each}" for each in dict.fromkeys(verdicts))
-    written = target is not None and found[0].file is not None
-    return (f"\n{len(found)} metrics: {counts}\n" if len(found) > 1 else "") + (
-        f"  metric file {visible(target or '')}\n" if written else ""
-    )
+    many = f"\n{len(found)} metrics: {counts}\n" if len(found) > 1 else ""
+    return many + (f"  metric file {visible(target)}\n" if target and found[0].proven else "")
 
 
-def _as_locked(specs: Sequence[Spec], found: Sequence[Verified], terminal: Terminal) -> ExitCode:
+def _as_locked(specs: Sequence[Spec], found: Sequence[VerifiedMetric], terminal: Terminal) -> ExitCode:
     """Certified if every metric is what the section `expect` of its specification says."""
     from tubecert.checking.expectations import metric_compared, outcome_of_metric
     from tubecert.report.findings import render
 
+    pairs = zip(specs, found, strict=True)
     wrong = [
-        each
-        for spec, verified in zip(specs, found, strict=True)
-        for each in metric_compared(spec, outcome_of_metric(verified))
+        each for spec, metric in pairs for each in metric_compared(spec, outcome_of_metric(metric.found))
     ]
     if wrong:
         terminal.show(render(wrong))
     return ExitCode.NOT_CERTIFIED if wrong else ExitCode.CERTIFIED
 
 
-def _cases(files: Sequence[str], rate: Fraction | None, settings: Sequence[Setting]) -> Iterator[Case]:
-    """What is to be decided, read before any work is done; raises `TubecertError`."""
-    from tubecert.spec.load import load_system
+def _cases(
+    files: Sequence[str], rate: Fraction | None, settings: Sequence[Setting]
+) -> Iterator[tuple[str, Spec]]:
+    """What is to be decided, read before any work is done: the file of each metric, and the specification with it.
+
+    Raises `TubecertError`.
+    """
+    from tubecert.spec import load
     from tubecert.spec.metric_file import with_metric
 
     pending: tuple[str, Spec] | None = None
@@ -128,31 +132,21 @@ def _cases(files: Sequence[str], rate: Fraction | None, settings: Sequence[Setti
     for file in files:
         if Path(file).suffix.lower() in _METRICS:
             if system is None:
-                raise _error(file, "a metric needs a system", "give a specification before it")
+                raise _no_system(file)
             pending = None
-            yield _case(file, with_metric(system, file, rate), rate)
+            yield file, metrics.at_rate(with_metric(system, file, rate), rate)
         else:
             if pending is not None:
-                yield _case(*pending, rate)
-            system = load_system(file, settings)
+                yield pending[0], metrics.at_rate(pending[1], rate)
+            system = load(file, settings, "system")
             pending = file, system
     if pending is not None:
-        yield _case(*pending, rate)
+        yield pending[0], metrics.at_rate(pending[1], rate)
 
 
-def _case(file: str, spec: Spec, rate: Fraction | None) -> Case:
-    if spec.metric is None:
-        remedy = "give a metric file after the specification (tubecert synth finds one), or metric.dual_metric and rate"
-        raise _error(file, "there is no metric to verify", remedy)
-    return Case(file=file, spec=at_rate(spec, rate))
+def _no_system(file: str) -> TubecertError:
+    from tubecert.findings import Finding, Location
 
-
-def _error(file: str, message: str, help: str) -> TubecertError:
-    place = Location(file=file, line=1, column=1)
+    place, message = Location(file=file, line=1, column=1), "a metric needs a system"
+    help = "give a specification before it"
     return SpecError([Finding(code="TC105", message=message, location=place, help=help)])
-
-
-def _code(found: Sequence[Verified]) -> ExitCode:
-    """The worst: refuted, then undecided."""
-    codes = [verified.verdict.exit_code for verified in found]
-    return next((c for c in (ExitCode.NOT_CERTIFIED, ExitCode.UNDECIDED) if c in codes), ExitCode.CERTIFIED)

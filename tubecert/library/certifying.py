@@ -1,43 +1,83 @@
-"""Certification from code, and what the command shares with it: a question in, a sealed certificate out."""
+"""Certification from code, and for the command: a question in, a sealed certificate out."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from datetime import UTC, datetime
-from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from tubecert import certificate
-from tubecert.executor import Executor, held
-from tubecert.letters import ALL, words_of
-from tubecert.libraries import versions
-from tubecert.library.asked import (
-    CertificationNumbers,
-    certification_numbers,
-    jobs_of,
-    one_of,
-    refuse,
+from tubecert.asking import (
+    METRIC,
+    SEARCH,
+    Choice,
+    Exact,
+    Number,
+    Source,
+    Text,
+    asker,
+    exact,
+    question,
     require_nothing_of_a_metric,
-    require_once,
 )
-from tubecert.library.plain import Number, number_texts
-from tubecert.library.specification import Specifiable, Specification, spec_of
-from tubecert.library.workers import workers_of
-from tubecert.progress import Progress
-from tubecert.report.progress import timed
-from tubecert.spec import Spec
+from tubecert.letters import ALL, words_of
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.metrics import MetricLike
     from tubecert.library.sampled import SampledCertification
-    from tubecert.pipeline.synthesised import Synthesised
-    from tubecert.stages.options import Options
+    from tubecert.library.specification import Specifiable
+    from tubecert.progress import Progress
+
+BUDGET: Final = Exact("Boxes examined per claim before giving up.", whole=True, of=METRIC)
+DEADLINE: Final = Exact(
+    "Seconds after which the command ends, with the best metric that was found so far.", of=SEARCH
+)
+SCHEDULER: Final = Text("Work on a running Dask cluster (extra: tubecert[cluster]).", "ADDRESS", of=SEARCH)
+METRIC_FILE: Final = Source(
+    "Metric file (JSON) in place of the specification's.", "FILE", sets="metric", of=METRIC
+)
+DECIDING: Final = (*words_of(), ALL)
+AUTO: Final = "auto"  # the gap of each constant by its effect
+PAIR: Final = ("bandwidth", "adaptation_rate")
+_GAP: Final = (
+    "Relative width at which a constant is sharp enough; auto: of each by its effect on the gains.  "
+    "[tube.gap; else auto for half-widths of four or more states or along a plan that moves, 1/100 elsewhere]"
+)
 
 
+@question(
+    {
+        "rho_a": Exact(
+            "Radius left to the adaptation, a length over all states (overrides tube.rho_a).",
+            sets="tube.rho_a",
+            of=METRIC,
+        ),
+        "epsilon": Exact(
+            "Radius beyond the initial offset (overrides tube.epsilon; not beside half_widths).",
+            sets="tube.epsilon",
+            of=METRIC,
+        ),
+        "metric": METRIC_FILE,
+        "conditions": Choice(
+            "Which certificate decides the verdict: 0 (none: no adaptation), A (26: the paper's), B (distance), "
+            "or all of them; all are always computed.  [conditions.decides, or A]",
+            words=DECIDING,
+            of=METRIC,
+        ),
+        "bandwidth": Exact("Judge this filter bandwidth, in rad/s.", moderate=True, of=METRIC),
+        "adaptation_rate": Exact("... with this adaptation rate.", moderate=True, of=METRIC),
+        "gap": Exact(_GAP, "NUMBER|auto", below=1, word=AUTO, of=METRIC),
+        "budget": BUDGET,
+        "deadline": DEADLINE,
+        "jobs": Exact(
+            "Processes that share the boxes of a long search (none with hardware).", whole=True, of=SEARCH
+        ),
+        "scheduler": SCHEDULER,
+    },
+    PAIR,
+)
 def certify(
     spec: Specifiable,
     *,
@@ -60,90 +100,60 @@ def certify(
     of the options only `progress` means something.
 
     `metric` stands in for the specification's own: a file, a mapping with `rate` and `dual_metric`, or what
-    `synthesise` found. `conditions`: the letter of the certificate that decides the verdict, or `all`. `progress` is
+    `synth` found. `conditions`: the letter of the certificate that decides the verdict, or `all`. `progress` is
     called with every `Step` that is told. Numbers are exact; a float stands for its shortest decimal. The boxes of a
     long search are shared by `jobs` processes (then the caller's own code stands below `if __name__ == "__main__":`),
     or by the workers of a Dask cluster at the address `scheduler`; no result depends on that.
 
     Returns the certificate whatever the verdict is. Raises `SpecError` for what makes the question meaningless.
     """
-    texts = number_texts(
-        rho_a=rho_a,
-        epsilon=epsilon,
-        bandwidth=bandwidth,
-        adaptation_rate=adaptation_rate,
-        gap=gap,
-        budget=budget,
-        deadline=deadline,
-    )
-    numbers = certification_numbers(texts, str)
-    _check_words(conditions, numbers)
+    from tubecert.library import sampled
+    from tubecert.library.specification import Specification, require_once, settings_in, spec_of
+    from tubecert.report.progress import timed
+
     whole = spec_of(spec)
     if whole.hardware is not None:
-        words = {"metric": metric, "conditions": conditions, "scheduler": scheduler}
-        require_nothing_of_a_metric({**texts, **words, "jobs": None if jobs == 1 else jobs}, str)
-        from tubecert.library import sampled
-
-        return sampled.certified(whole, progress=timed(progress), command="tubecert.certify")
-    require_once(whole, {**texts, "metric": metric})
-    options = numbers.options(conditions=conditions)
-    if metric is not None:
-        from tubecert.library.metrics import with_metric
-
-        whole, name = with_metric(whole, metric)
-        options = replace(options, metric=Path(name))
-    return certified(
-        whole,
-        options,
-        timed(progress),
-        seconds=numbers.deadline,
-        command="tubecert.certify",
-        workers=workers_of(jobs_of("jobs", str(jobs)), scheduler, "scheduler"),
-    )
-
-
-def certified(
-    spec: Spec,
-    options: Options,
-    progress: Progress | None,
-    *,
-    seconds: Fraction | None,
-    command: str,
-    kept: Callable[[Synthesised], None] | None = None,
-    workers: Executor | None = None,
-) -> Certification:
-    """The sealed answer to a question; `command` is noted as its origin, `seconds` ends the search for a metric.
-
-    `kept` hears what a search for a metric has; `workers` share long searches.
-    """
-    from tubecert import pipeline
+        require_nothing_of_a_metric()
+        return sampled.certified(whole, timed(progress))
+    from tubecert import certificate, pipeline
+    from tubecert.executor import held
     from tubecert.library.certification import certification_of
-    from tubecert.stages.options import overridden
+    from tubecert.library.metrics import with_metric
+    from tubecert.library.workers import workers_of
+    from tubecert.stages.options import Options, overridden
 
-    run = ran(command)
-    deadline = None if seconds is None else pipeline.Deadline.after(float(seconds))
-    with held(workers) as helpers:
-        result = pipeline.certify(spec, options, progress, deadline=deadline, kept=kept, workers=helpers)
+    require_once(settings_in(whole))
+    whole, file = (whole, None) if metric is None else with_metric(whole, metric)
+    usual = Options()
+    options = Options(
+        rho_a=exact(rho_a),
+        epsilon=exact(epsilon),
+        metric=None if file is None else Path(file),
+        conditions=conditions,
+        bandwidth=exact(bandwidth),
+        adaptation_rate=exact(adaptation_rate),
+        by_effect=None if gap is None else gap == AUTO,
+        gap=exact(None if gap == AUTO else gap) or usual.gap,
+        budget=budget or usual.budget,
+    )
+    run = ran("tubecert.certify")
+    limit = None if deadline is None else pipeline.Deadline.after(float(deadline))
+    with held(workers_of(jobs, scheduler)) as workers:
+        result = pipeline.certify(
+            whole, options, timed(progress), deadline=limit, kept=asker().heard, workers=workers
+        )
     sealed = certificate.seal(result.to_json(), run())
-    return certification_of(sealed, Specification(spec=overridden(spec, options)))
+    return certification_of(sealed, Specification(spec=overridden(whole, options)))
 
 
-def ran(command: str) -> Callable[[], Mapping[str, object]]:
+def ran(function: str) -> Callable[[], Mapping[str, object]]:
     """What is noted of a run that begins now, once it is over: command line, beginning, seconds, versions."""
+    from tubecert.libraries import versions
+
     started, clock = datetime.now(UTC), time.perf_counter()
     return lambda: {
-        "command": command,
+        "command": asker().command or function,
         "started": started.isoformat(timespec="seconds"),
         "seconds": round(time.perf_counter() - clock, 3),
         "versions": versions(),
     }
-
-
-def _check_words(conditions: str | None, numbers: CertificationNumbers) -> None:
-    """Raises `SpecError` for words that mean nothing, and for half of a pair of gains."""
-    one_of("conditions", conditions, (*words_of(), ALL))
-    bandwidth, rate = numbers.bandwidth, numbers.adaptation_rate
-    if bandwidth is not None and rate is None:
-        refuse("bandwidth", str(bandwidth), "bandwidth and adaptation_rate are given together")
-    if rate is not None and bandwidth is None:
-        refuse("adaptation_rate", str(rate), "adaptation_rate and bandwidth are given together")

@@ -11,10 +11,10 @@ from types import MappingProxyType
 from typing import Final
 
 from tubecert import certificate
+from tubecert.asking import refuse
 from tubecert.certificate.effective import Tree
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
-from tubecert.library.asked import refuse
 from tubecert.library.certification import Certification
 from tubecert.library.reading import read
 from tubecert.library.sampled import SampledCertification

@@ -1,58 +1,69 @@
-"""Metrics from code: found and proven, or from elsewhere and decided; and what `synth` shares with it."""
+"""Metrics from code, and for the commands: `synth` finds one and proves it, `verify` decides one from elsewhere."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from tubecert import certificate, pipeline
-from tubecert.certificate.metric_file import MetricFile
-from tubecert.claims.family import Reason
-from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.enclosure.constant import Constant
-from tubecert.errors import SpecError
-from tubecert.findings import Finding
-from tubecert.kinds import ALONE, DISTANCE
-from tubecert.library import plain
-from tubecert.library.asked import (
-    SynthesisNumbers,
-    Wishes,
-    at_rate,
-    degree_of,
-    one_of,
-    require_once,
-    synthesis_numbers,
-    verification_numbers,
-    wanted_of,
+from tubecert.asking import (
+    Choice,
+    Exact,
+    Flag,
+    Names,
+    Number,
+    Source,
+    Text,
+    asker,
+    exact,
+    named,
+    question,
+    refuse,
 )
-from tubecert.library.plain import Data, Number, number_texts
-from tubecert.library.specification import File, Specifiable, Specification, spec_of
-from tubecert.progress import Progress
-from tubecert.report.progress import timed
-from tubecert.spec import Spec, metric_file
-from tubecert.spec.metric import COORDINATES, OBJECTIVES, ROUTES
-from tubecert.verdict import Verdict
+from tubecert.errors import SpecError
+from tubecert.library.certifying import BUDGET, DEADLINE
+from tubecert.library.shown import Shown
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from tubecert.certificate.metric_file import MetricFile
+    from tubecert.enclosure.constant import Constant
+    from tubecert.library.plain import Data
+    from tubecert.library.specification import File, Specifiable
     from tubecert.pipeline.synthesised import Synthesised
     from tubecert.pipeline.verification import Verified
+    from tubecert.progress import Progress
     from tubecert.report.page import Page
+    from tubecert.spec import Spec, Synthesis
+    from tubecert.verdict import Verdict
 
 IN_CODE: Final = "given in code"  # what a certificate calls a metric that is no file
+_BUDGET: Final = 2_000_000  # boxes of a verification
+_OF_SECTION: Final = (
+    "rate", "objective", "degree", "variables", "condition_number", "coordinates", "route", "solver",
+)  # fmt: skip
 
 
-class _Held:
-    """What metrics from code have in common: a metric file that can be kept, if the metric is proven."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class _Metric(Shown):
+    """A metric on a safe set, as far as it is known: `found` has it all."""
 
-    __slots__ = ()
+    found: Any = field(repr=False)
+    name: str
+
+    @property
+    def verdict(self) -> Verdict:
+        """`certified`: C1-C3 are proven; `refuted`: they fail, or no metric has the rate; else `undecided`."""
+        found: Verdict = self.found.verdict
+        return found
 
     @property
     def file(self) -> MetricFile | None:
-        """The metric as its file has it, None if it is not proven."""
-        raise NotImplementedError
+        """The metric as its file has it, None if nothing is proven."""
+        file: MetricFile | None = self.found.file
+        return file
 
     @property
     def proven(self) -> bool:
@@ -64,8 +75,16 @@ class _Held:
         """W(x) (n, n) as expressions; None if nothing is proven."""
         return None if self.file is None else self.file.dual_metric
 
+    @property
+    def reason(self) -> str:
+        """What fails, or why there is no metric, in words; empty if nothing does."""
+        return "" if self.found.reason is None else str(self.found.reason.sentence)
+
     def text(self) -> str:
         """The metric file. Raises `TubecertError` if nothing is proven."""
+        from tubecert import certificate
+        from tubecert.findings import Finding
+
         if self.file is None:
             message = "there is no metric that is proven"
             raise SpecError([Finding(code="TC105", message=message, help="look at its reason")])
@@ -73,28 +92,20 @@ class _Held:
 
     def save(self, path: File) -> None:
         """Write the metric file, as `synth` does. Raises `TubecertError` if nothing is proven, `TargetError`."""
+        from tubecert import certificate
+
         certificate.write_text(os.fspath(path), self.text(), "choose another file")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SynthesisedMetric(_Held):
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class SynthesisedMetric(_Metric):
     """What a synthesis came to: a metric that is proven, or why there is none.
 
     `found` has the attempts, the metrics that were compared, and what is against other rates.
     """
 
     found: Synthesised = field(repr=False)
-    given: Specification
-
-    @property
-    def verdict(self) -> Verdict:
-        """`certified`: a metric is proven; `refuted`: none has the rate; `undecided`: none was found."""
-        return self.found.verdict
-
-    @property
-    def file(self) -> MetricFile | None:
-        """The metric as its file has it, None if there is none."""
-        return self.found.file
+    states: tuple[str, ...] = field(repr=False)
 
     @property
     def rate(self) -> float | None:
@@ -106,46 +117,16 @@ class SynthesisedMetric(_Held):
         """A bound from above of the condition number over the safe set."""
         return None if self.file is None else self.file.condition_number.above
 
-    @property
-    def reason(self) -> str:
-        """Why there is none, in words; empty if there is one."""
-        return _sentence(self.found.reason)
-
-    def __str__(self) -> str:
-        from tubecert.report.text import headline
-
-        return headline(self._page()).plain
-
-    def __repr__(self) -> str:
-        return f"<SynthesisedMetric: {self}>"
-
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-
-        return notebook.of_page(self._page())
-
     def _page(self) -> Page:
         from tubecert.report.synthesis import page_of
 
-        return page_of(self.found.search(), self.file, self.given.name, self.given.states)
+        return page_of(self.found.search(), self.file, self.name, self.states)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class VerifiedMetric(_Held):
+class VerifiedMetric(_Metric):
     """What is known of a metric on a safe set; `found` has it all."""
 
-    found: Verified = field(repr=False)
-    name: str
-
-    @property
-    def verdict(self) -> Verdict:
-        """On C1-C3 at the rate."""
-        return self.found.verdict
-
-    @property
-    def file(self) -> MetricFile | None:
-        """The metric as its file has it, None if it is not proven."""
-        return self.found.file
+    found: Verified
 
     @property
     def rate(self) -> float:
@@ -162,31 +143,13 @@ class VerifiedMetric(_Held):
         """The condition number over the safe set, enclosed."""
         return self.found.condition_number
 
-    @property
-    def reason(self) -> str:
-        """What fails, in words; empty if nothing does."""
-        return _sentence(self.found.reason)
-
-    def __str__(self) -> str:
-        from tubecert.report.text import headline
-
-        return headline(self._page()).plain
-
-    def __repr__(self) -> str:
-        return f"<VerifiedMetric: {self}>"
-
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-
-        return notebook.of_page(self._page())
-
     def _page(self) -> Page:
         from tubecert.report.verification import page_of
 
         return page_of(self.name, self.found)
 
 
-MetricLike: TypeAlias = File | SynthesisedMetric | VerifiedMetric | Data
+MetricLike: TypeAlias = "File | SynthesisedMetric | VerifiedMetric | Data"
 
 
 def with_metric(spec: Spec, metric: MetricLike, rate: Fraction | None = None) -> tuple[Spec, str]:
@@ -194,21 +157,30 @@ def with_metric(spec: Spec, metric: MetricLike, rate: Fraction | None = None) ->
 
     `rate` stands in for that of coefficients. Raises `TubecertError`.
     """
-    if isinstance(metric, (SynthesisedMetric, VerifiedMetric)):
+    from tubecert.library.plain import document_text
+    from tubecert.spec import metric_file
+
+    if isinstance(metric, _Metric):
         return metric_file.with_metric_text(spec, metric.text(), f"<{IN_CODE}>"), IN_CODE
     if isinstance(metric, Mapping):
         whole = {"format": metric_file.FORMAT, **metric}
-        return metric_file.with_metric_text(spec, plain.document_text(whole), f"<{IN_CODE}>"), IN_CODE
+        return metric_file.with_metric_text(spec, document_text(whole), f"<{IN_CODE}>"), IN_CODE
     path = os.fspath(metric)
     return metric_file.with_metric(spec, path, rate), os.path.basename(path)
 
 
+@question({
+    "metric": Source("The metric, in place of the specification's.", "METRIC"),
+    "rate": Exact("Decide at this rate, in 1/s, in place of the metric's own."),
+    "gap": Exact("Relative width to which the largest rate is enclosed.", below=1),
+    "budget": BUDGET,
+})  # fmt: skip
 def verify(
     spec: Specifiable,
     metric: MetricLike | None = None,
     *,
     rate: Number | None = None,
-    gap: Number | None = None,
+    gap: Number = "1/1000",
     budget: int | None = None,
     progress: Progress | None = None,
 ) -> VerifiedMetric:
@@ -217,25 +189,65 @@ def verify(
     Without `metric` it is the specification's own. `rate`, in 1/s, is asked about in place of the metric's. A file or a
     mapping with a system, its safe set and a metric suffices as `spec`. Raises `SpecError` if there is no metric.
     """
+    from tubecert.enclosure.branch_and_bound import Effort
+    from tubecert.library.specification import spec_of
     from tubecert.pipeline.verification import verify as decided
+    from tubecert.report.progress import timed
 
-    numbers = verification_numbers(number_texts(rate=rate, gap=gap, budget=budget), str)
-    wanted, effort = numbers.rate, Effort(gap=float(numbers.gap), budget=numbers.budget)
     whole, name = spec_of(spec, reads="system"), ""
     if metric is not None:
-        whole, name = with_metric(whole, metric, wanted)
+        whole, name = with_metric(whole, metric, exact(rate))
+    effort = Effort(gap=float(gap), budget=budget or _BUDGET)
     return VerifiedMetric(
-        found=decided(at_rate(whole, wanted), effort, timed(progress)), name=name or whole.name
+        found=decided(at_rate(whole, exact(rate)), effort, timed(progress)), name=name or whole.name
     )
 
 
-def synthesise(
+def at_rate(spec: Spec, rate: Fraction | None) -> Spec:
+    """The specification with another rate of its metric, if one is given; raises `SpecError` if it has no metric."""
+    if spec.metric is None:
+        from tubecert.findings import Finding, Location, NamedPlace
+
+        place = (Location if asker().options else NamedPlace)(file=spec.path, line=1, column=1)
+        help = "give a metric file after the specification (tubecert synth finds one), or metric.dual_metric and rate"
+        if not asker().options:
+            help = "give metric.dual_metric and metric.rate, or a metric beside the specification"
+        message = "there is no metric to verify"
+        raise SpecError([Finding(code="TC105", message=message, location=place, help=help)])
+    return spec if rate is None else replace(spec, metric=replace(spec.metric, rate=rate))
+
+
+@question({
+    "rate": Exact("Contraction rate, in 1/s."),
+    "objective": Choice(
+        "What is best. At a rate: the least condition number, the greatest margin. Else the rate that "
+        "gives the least adaptation rate or the smallest tube, or the greatest rate.",
+        words=("condition", "margin", "rate", "adaptation", "tube"),
+    ),
+    "degree": Exact("Degree of W(x).  [raised until it works]", whole=True, least=0, most=8),
+    "variables": Names("States that W depends on, e.g. x1,x3.  [chosen]", "NAMES"),
+    "condition_number": Exact("Not to be exceeded on the safe set."),
+    "coordinates": Choice(
+        "In which the condition number counts; auto: half-widths of the safe set.  [auto]",
+        words=("auto", "identity"),
+    ),
+    "route": Choice("How metrics are found.  [auto]", words=("auto", "sos", "cegis")),
+    "solver": Text(
+        "Which solver proposes; NAME: one that cvxpy knows.  [clarabel]", "<clarabel|scs|cvxpy:NAME>"
+    ),
+    "table": Flag("Compare metrics over a range of rates."),
+    "rho_a": Exact("Overrides tube.rho_a.", sets="tube.rho_a"),
+    "epsilon": Exact("Overrides tube.epsilon.", sets="tube.epsilon"),
+    "budget": BUDGET,
+    "deadline": DEADLINE,
+})  # fmt: skip
+def synth(
     spec: Specifiable,
     *,
     rate: Number | None = None,
     objective: str | None = None,
     degree: int | None = None,
-    variables: Sequence[str] | None = None,
+    variables: str | Sequence[str] | None = None,
     condition_number: Number | None = None,
     coordinates: str | None = None,
     route: str | None = None,
@@ -252,54 +264,78 @@ def synthesise(
     Returns what came of it, also if there is no metric. An interruption returns the best that was proven by then, if
     anything was. Raises `SpecError` for what makes the question meaningless.
     """
-    texts = number_texts(
-        rate=rate,
-        condition_number=condition_number,
-        rho_a=rho_a,
-        epsilon=epsilon,
-        budget=budget,
-        deadline=deadline,
-    )
-    numbers = synthesis_numbers(texts, str)
-    system = spec_of(spec)
-    require_once(system, texts)
-    wishes = Wishes(
-        rate=numbers.rate,
-        objective=one_of("objective", objective, OBJECTIVES),
-        degree=degree_of(degree),
-        variables=None if variables is None else tuple(map(str, variables)),
-        condition_number=numbers.condition_number,
-        coordinates=one_of("coordinates", coordinates, COORDINATES),
-        route=one_of("route", route, ROUTES),
-        solver=solver,
-    )
-    seconds = numbers.deadline
+    from tubecert import pipeline
+    from tubecert.kinds import ALONE, DISTANCE
+    from tubecert.library.specification import require_once, settings_in, spec_of
+    from tubecert.report.progress import timed
+
+    system, given = spec_of(spec, reads="plant"), asker().given
+    require_once(settings_in(system))
+    # metrics are compared end to end by what the specification decides, else by the distance form
+    decides = system.decides or DISTANCE.option
+    options = pipeline.Options(rho_a=exact(rho_a), epsilon=exact(epsilon), conditions=decides)
     found = pipeline.synthesise(
         system,
-        wanted_of(system, wishes, str),
-        options_of(system, numbers),
+        wanted_of(system, {name: given[name] for name in _OF_SECTION if given.get(name) is not None}),
+        options if budget is None else replace(options, budget=budget),
         timed(progress),
         table=table,
-        deadline=None if seconds is None else pipeline.Deadline.after(float(seconds)),
-        enough=content(system, objective),
+        deadline=None if deadline is None else pipeline.Deadline.after(float(deadline)),
+        told=asker().judged,
+        kept=asker().heard,
+        # a tube that needs no adaptation is enough where neither an objective nor another certificate is asked for
+        enough=objective is None and system.decides in (None, ALONE.option),
     )
-    if found.cut == "interrupted" and found.file is None:
+    if found.cut == "interrupted" and found.file is None and asker().judged is None:
         raise KeyboardInterrupt
-    return SynthesisedMetric(found=found, given=Specification(spec=system))
+    return SynthesisedMetric(found=found, name=system.name, states=system.states)
 
 
-def content(system: Spec, objective: str | None) -> bool:
-    """Whether a tube that needs no adaptation is enough: neither an objective nor another certificate is asked for."""
-    return objective is None and system.decides in (None, ALONE.option)
+def wanted_of(system: Spec, said: Mapping[str, Any]) -> Synthesis:
+    """What is asked for: the specification's section, changed by what is `said` of it.
+
+    Without a section the rate is that of the specification's own metric. Raises `SpecError` if they do not go together.
+    """
+    from tubecert.spec import Synthesis
+
+    own = system.synthesis
+    if own is None:
+        rate = None if system.metric is None else system.metric.rate
+        own = Synthesis(rate=rate, objective="adaptation" if rate is None else "condition")
+    asked, objective = said.get("rate"), said.get("objective", own.objective)
+    rate = asked or own.rate
+    if objective == "rate" or (
+        objective in ("adaptation", "tube") and asked is None and own.objective != objective
+    ):
+        rate = None  # searched for
+    elif asked is not None and "objective" not in said and own.rate is None:
+        objective = "condition"
+    if objective == "rate" and asked is not None:
+        text = f"the objective rate searches for the rate; {named('rate')} cannot be given"
+        refuse(named("objective"), "rate", text)
+    if objective in ("condition", "margin") and rate is None:
+        refuse(named("objective"), objective, f"the objective {objective} needs {named('rate')}, in 1/s")
+    known = {"variables": _states(system, said), "solver": _solver(said)}
+    values = {**said, **{name: each for name, each in known.items() if each is not None}}
+    outputs = own.outputs if objective == "tube" else ()
+    return replace(own, **{**values, "rate": rate, "objective": objective, "outputs": outputs})
 
 
-def options_of(system: Spec, numbers: SynthesisNumbers) -> pipeline.Options:
-    """How metrics are compared end to end: by what the specification decides, else by the distance form."""
-    options = pipeline.Options(
-        rho_a=numbers.rho_a, epsilon=numbers.epsilon, conditions=system.decides or DISTANCE.option
-    )
-    return options if numbers.budget is None else replace(options, budget=numbers.budget)
+def _solver(said: Mapping[str, Any]) -> str | None:
+    from tubecert.spec.metric import solver_name
+
+    text = said.get("solver")
+    found = None if text is None else solver_name(text)
+    if text is not None and found is None:
+        known = "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows"
+        refuse(named("solver"), text, known)
+    return found
 
 
-def _sentence(reason: Reason | None) -> str:
-    return "" if reason is None else reason.sentence
+def _states(system: Spec, said: Mapping[str, Any]) -> tuple[str, ...] | None:
+    names: tuple[str, ...] | None = said.get("variables")
+    for name in names or ():
+        if name not in system.states:
+            known = f"{name} is no state; the states are {', '.join(system.states)}"
+            refuse(named("variables"), ",".join(names or ()), known)
+    return names

@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Final
 
-from tubecert import files
-from tubecert.certificate.file import write_bytes, write_text
+from tubecert.asking import Text, question
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
-from tubecert.library.reading import read
-from tubecert.library.specification import File
-from tubecert.library.stated import page_of
-from tubecert.records import OPEN, FormError, from_json
-from tubecert.report import html, markdown
-from tubecert.report.page_simulation import TITLES, Simulated
+from tubecert.library.reading import certificate_of
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
+    from tubecert.library.specification import File
+    from tubecert.report.page_simulation import Simulated
     from tubecert.report.quantities import AnyCertificate
 
 HTML, MARKDOWN = (".html", ".htm"), (".md", ".markdown")
-_FOLDER: Final = files.Kind(
-    most=20_000_000,
-    unreadable="TC600",
-    too_large="TC600",
-    help="give a folder that tubecert simulate --certificate wrote for this certificate",
-)
 REMEDY: Final = "give a file FILE.html or FILE.md in a folder that exists"
+_HELP: Final = "give a folder that tubecert simulate --certificate wrote for this certificate"
+_MOST: Final = 20_000_000  # bytes of a file in such a folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,30 +36,41 @@ class Report:
     @property
     def html(self) -> str:
         """The page as one HTML file that needs nothing else."""
+        from tubecert.library.stated import page_of
+        from tubecert.report import html
+
         return html.render_page(page_of(self.certificate, self.simulated))
 
     @property
     def markdown(self) -> str:
         """The same words and tables as Markdown, without figures."""
+        from tubecert.library.stated import page_of
+        from tubecert.report import markdown
+
         return markdown.render_page(page_of(self.certificate, self.simulated))
 
     def save(self, path: File) -> None:
         """Write the page: FILE.html or FILE.md. Raises `TargetError`."""
+        from tubecert.certificate.file import write_text
+
         target = os.fspath(path)
         require_page(target)
-        text = self.markdown if _suffix(target) in MARKDOWN else self.html
-        write_text(target, text, REMEDY)
+        write_text(target, self.markdown if _suffix(target) in MARKDOWN else self.html, REMEDY)
 
     def save_figures(self, folder: File) -> list[str]:
         """Write every figure into a folder, as SVG, PDF and PNG, and what they show as captions.md; their names.
 
         PDF and PNG need matplotlib (the extra `simulate`). Raises `TargetError`.
         """
+        from importlib.util import find_spec
+
+        from tubecert.certificate.file import write_bytes
+        from tubecert.library.stated import page_of
         from tubecert.report.figures_file import painted, svg_file
 
         told = page_of(self.certificate, self.simulated).figures
         data = {f"{each.key}.svg": svg_file(each).encode() for each in told}
-        if importlib.util.find_spec("matplotlib") is not None:
+        if find_spec("matplotlib") is not None:
             data |= {
                 f"{each.key}.{ending}": painted(ending, each) for each in told for ending in ("pdf", "png")
             }
@@ -86,43 +88,37 @@ class Report:
         return f'<iframe srcdoc="{escape(self.html)}" style="{style}" title="tubecert certificate"></iframe>'
 
 
+@question({"simulation": Text("Show the figures that simulate drew for it.", "FOLDER")})
 def report(result: Certification | SampledCertification | File, *, simulation: File | None = None) -> Report:
     """The page of a certificate, or of the file of one: `tubecert report`. Raises `TargetError`.
 
     `simulation` is a folder that `tubecert simulate` wrote for this certificate; its figures are shown in HTML.
     """
-    found = read(result) if isinstance(result, (str, os.PathLike)) else result
-    shown = None if simulation is None else simulated_in(os.fspath(simulation), found.certificate)
-    return Report(certificate=found.certificate, simulated=shown)
+    sealed = certificate_of(result).certificate
+    shown = None if simulation is None else _simulated_in(os.fspath(simulation), sealed)
+    return Report(certificate=sealed, simulated=shown)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Summary:
-    """What is read of the summary of a simulation."""
-
-    outcome: str
-    certificate: str
-
-
-OPEN.add(_Summary)
-
-
-def simulated_in(folder: str, certificate: AnyCertificate) -> Simulated:
+def _simulated_in(folder: str, certificate: AnyCertificate) -> Simulated:
     """What a folder of `simulate` shows; raises `TargetError` for another folder, and for another certificate's."""
-    text = files.read(os.path.join(folder, "summary.json"), _FOLDER)
+    from tubecert import files
+    from tubecert.report.page_simulation import TITLES, Simulated
+
+    kind = files.Kind(most=_MOST, unreadable="TC600", too_large="TC600", help=_HELP)
     try:
-        summary = from_json(_Summary, json.loads(text), "summary")
-    except (ValueError, RecursionError, FormError):
+        summary = json.loads(files.read(os.path.join(folder, "summary.json"), kind))
+        outcome, of = str(summary["outcome"]), summary["certificate"]
+    except (ValueError, RecursionError, KeyError, TypeError):
         raise _refused("TC601", f"{folder} holds no simulation of tubecert") from None
-    if summary.certificate != certificate.hash:
+    if of != certificate.hash:
         raise _refused("TC604", f"the simulation in {folder} was compared with another certificate")
     names = ((name, os.path.join(folder, f"{name}.png")) for name in TITLES)
-    figures = {name: files.read(path, _FOLDER) for name, path in names if os.path.exists(path)}
-    return Simulated(outcome=summary.outcome, figures=figures)
+    figures = {name: files.read(path, kind) for name, path in names if os.path.exists(path)}
+    return Simulated(outcome=outcome, figures=figures)
 
 
 def _refused(code: str, message: str) -> TargetError:
-    return TargetError([Finding(code=code, message=message, help=_FOLDER.help)])
+    return TargetError([Finding(code=code, message=message, help=_HELP)])
 
 
 def require_page(target: str) -> None:

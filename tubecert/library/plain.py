@@ -8,23 +8,18 @@ would print as something else is refused.
 from __future__ import annotations
 
 import json
-import numbers
 import sys
 from collections.abc import Iterable, Mapping
-from decimal import Decimal
-from fractions import Fraction
-from math import isnan
 from typing import Any, Final, NoReturn, Protocol, TypeAlias, runtime_checkable
 
+from tubecert.asking import plain_number, shown
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, NamedPlace
 from tubecert.spec import codes
 
-Number: TypeAlias = int | float | str | Fraction | Decimal
 Data: TypeAlias = Mapping[Any, Any]  # keys are texts, or symbols of sympy
 Plain: TypeAlias = "bool | str | list[Plain] | dict[str, Plain] | None"
 _DEEPEST: Final = 60  # the reader of specifications refuses less
-_LARGEST: Final = 10**4000  # what has more digits is refused by Python, and by the reader
 _VECTORS: Final = (  # keys for which a matrix with one column, or one row, stands for its entries
     "system.f",
     "uncertainty.h",
@@ -57,23 +52,6 @@ class _Expression(Protocol):
     def xreplace(self, rule: Mapping[object, object]) -> _Expression: ...
 
 
-def number_text(value: Number, name: str) -> str:
-    """A number as it is written; raises `SpecError` for what is none."""
-    if isinstance(value, str):
-        return value
-    text = _number(value)
-    if text is None:
-        _refuse(
-            name, f"{_shown(value)} is no number", "give an int, a float, a Fraction, a Decimal or a text"
-        )
-    return text
-
-
-def number_texts(**values: Number | None) -> dict[str, str | None]:
-    """The same for several, by name; what is None stays so."""
-    return {name: None if value is None else number_text(value, name) for name, value in values.items()}
-
-
 def document_text(data: Data) -> str:
     """A mapping as text, one entry on a line, so that findings show the entry; raises `SpecError`."""
     return json.dumps(_plain(data, "", 0), indent=1, ensure_ascii=False) + "\n"
@@ -95,7 +73,7 @@ def _plain(value: object, path: str, depth: int) -> Plain:
         return _mapping(value, path, depth)
     if isinstance(value, (list, tuple)):
         return [_plain(item, f"{path}[{i}]", depth + 1) for i, item in enumerate(value)]
-    if (text := _number(value)) is not None:
+    if not _is(value, "is_Float") and (text := plain_number(value)) is not None:
         return text
     if isinstance(value, _Array):
         found = _plain(value.tolist(), path, depth + 1)
@@ -103,7 +81,7 @@ def _plain(value: object, path: str, depth: int) -> Plain:
     if isinstance(value, _Expression):
         return _expression(value, path)
     return _refuse(
-        path, f"{_shown(value)} has no place in a specification", "give a text, a number, a list or a mapping"
+        path, f"{shown(value)} has no place in a specification", "give a text, a number, a list or a mapping"
     )
 
 
@@ -136,20 +114,7 @@ def _key(key: object, path: str) -> str:
         return key
     if _is(key, "is_Symbol"):
         return str(key)
-    return _refuse(path, f"the key {_shown(key)} is no name", "give a text")
-
-
-def _number(value: object) -> str | None:
-    """Its exact text, of whatever library it is; a float's is the shortest that is read as the same float."""
-    if isinstance(value, Decimal):
-        return str(value)
-    if isinstance(value, numbers.Rational) and not isinstance(value, bool):
-        exact = Fraction(int(value.numerator), int(value.denominator))
-        return str(exact) if max(abs(exact.numerator), exact.denominator) < _LARGEST else None
-    if isinstance(value, numbers.Real) and not isinstance(value, (bool, _Expression)):
-        near = float(value)
-        return repr(near) if near == value or isnan(near) else None
-    return None
+    return _refuse(path, f"the key {shown(key)} is no name", "give a text")
 
 
 def _expression(value: _Expression, path: str) -> str:
@@ -184,14 +149,6 @@ def _check_atom(atom: object, path: str) -> None:
         )
     if _is(atom, "is_Symbol") and not (text.isidentifier() and text != "pi"):
         _refuse(path, f"the symbol {text[:40]!r} is no name", "use letters, digits and _")
-
-
-def _shown(value: object) -> str:
-    try:
-        text = repr(value)[:60]
-    except ValueError:  # more digits than Python writes
-        text = "a number"
-    return f"{text} ({type(value).__name__})"
 
 
 def _refuse(path: str, message: str, help: str) -> NoReturn:

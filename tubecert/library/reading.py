@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
-
-from tubecert.certificate import file
-from tubecert.library import sampled
-from tubecert.library.specification import File
-from tubecert.sampled_loop.record import FORMAT, of_json
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
+    from tubecert.library.specification import File
 
 
 def read(path: File) -> Certification | SampledCertification:
@@ -21,10 +17,21 @@ def read(path: File) -> Certification | SampledCertification:
     Raises `TargetError` for a file that is none, or that was changed afterwards. Its claims are not examined: that is
     what `recheck` does.
     """
-    source = os.fspath(path)
+    from tubecert.asking import text_of
+    from tubecert.certificate import file
+    from tubecert.sampled_loop.record import FORMAT, of_json
+
+    source = text_of("path", path)
     sealed = file.load(source, (file.FORMAT, FORMAT))
     if sealed["format"] == FORMAT:
-        return sampled.certification_of(of_json(sealed, source))
+        from tubecert.library.sampled import certification_of
+
+        return certification_of(of_json(sealed, source))
     from tubecert.library.certification import read_sealed
 
     return read_sealed(sealed, source)
+
+
+def certificate_of(result: Any) -> Any:
+    """A certificate that is given as a value, or as its file."""
+    return read(result) if isinstance(result, (str, os.PathLike)) else result

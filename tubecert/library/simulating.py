@@ -1,51 +1,81 @@
-"""Simulation from code, and what the command shares with it: which loops, with which gains, how many runs."""
+"""Simulation from code, and for the command: which loops, with which gains, how many runs."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final, cast
 
-from tubecert.certificate.result import Result
-from tubecert.errors import SpecError
-from tubecert.executor import Executor, Serial
-from tubecert.expression import suggestion
+from tubecert.asking import (
+    METRIC,
+    SEARCH,
+    Choice,
+    Exact,
+    Names,
+    Number,
+    Text,
+    asker,
+    exact,
+    named,
+    question,
+    require_nothing_of_a_metric,
+)
+from tubecert.errors import SpecError, TubecertError
 from tubecert.findings import Finding, Severity
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
-from tubecert.library import sampled_simulation
-from tubecert.library.asked import Named, one_of, require_nothing_of_a_metric
-from tubecert.library.certification import Certification
-from tubecert.library.numbers import Numbers
-from tubecert.library.plain import Number, number_texts
-from tubecert.library.reading import read
-from tubecert.library.sampled import SampledCertification, compared
-from tubecert.library.sampled_simulation import SampledSimulation
-from tubecert.library.simulation import Simulation
-from tubecert.library.specification import File, Specifiable, spec_of
-from tubecert.library.stated import Stated
-from tubecert.printable import visible
-from tubecert.progress import Progress
-from tubecert.report.progress import timed
-from tubecert.spec import Simulation as Section
-from tubecert.spec import Spec
-from tubecert.trajectory.make import plan_of
+from tubecert.library.certifying import SCHEDULER
 
 if TYPE_CHECKING:
-    from tubecert.simulation.adaptive.campaign import Campaign
+    from tubecert.certificate.result import Result
+    from tubecert.library.certification import Certification
+    from tubecert.library.sampled import SampledCertification
+    from tubecert.library.simulation import SampledSimulation, Simulation
+    from tubecert.library.specification import File, Specifiable
+    from tubecert.progress import Progress
+    from tubecert.sampled_loop.record import Certificate as SampledCertificate
     from tubecert.simulation.adaptive.families import Drawing
     from tubecert.simulation.adaptive.loops import Controller
     from tubecert.simulation.adaptive.setting import Setting
+    from tubecert.simulation.sampled.loop import Controllers, Step
+    from tubecert.spec import Spec
 
-_HERE: Final = Serial()
 EXTRA: Final = ("matplotlib",)
 RUNS: Final = 100
 MEMBERS: Final = 20  # random plans of a family
-SEED: Final = 0
 
 
+@question({
+    "controllers": Names(
+        "Loops, separated by commas: nominal, ccm, reference, l1.  [ccm,l1]",
+        "NAMES",
+        words=("nominal", "ccm", "reference", "l1"),
+        what="controller",
+        of=METRIC,
+    ),
+    "gains": Choice(
+        "The certificate whose gains are taken.  [distance]", words=tuple(words_of(ADAPTIVE)), of=METRIC
+    ),
+    "runs": Exact("Random runs against each loop that adapts; 0: no attacks.  [100]", whole=True, least=0),
+    "jobs": Exact("Vectors of 128 runs at a time; not with hardware.", whole=True, of=SEARCH),
+    "scheduler": SCHEDULER,
+    "seed": Exact("Seed of the random runs and of the adversary.  [0]", whole=True, least=0),
+    "replay": Exact(
+        "Draw this random run in place of the specification's h; not with hardware.",
+        whole=True,
+        least=0,
+        of=METRIC,
+    ),
+    "members": Exact(
+        "Of a family without hardware: random plans that share the runs.  [20]", whole=True, of=METRIC
+    ),
+    "plan": Text("... this plan (CSV or specification), if it is one.", "FILE", of=METRIC),
+    "duration": Exact("How long, in s.  [the horizon, else 10/rate]"),
+    "bandwidth": Exact("Choose the filter bandwidth, in rad/s.", moderate=True, of=METRIC),
+    "adaptation_rate": Exact("Choose the adaptation rate of l1.", moderate=True, of=METRIC),
+})  # fmt: skip
 def simulate(
     result: Certification | SampledCertification | File,
     *,
@@ -53,13 +83,15 @@ def simulate(
     controllers: str | Sequence[str] | None = None,
     gains: str | None = None,
     runs: int | None = None,
+    jobs: int = 1,
+    scheduler: str | None = None,
     seed: int | None = None,
     replay: int | None = None,
+    members: int | None = None,
+    plan: File | None = None,
     duration: Number | None = None,
     bandwidth: Number | None = None,
     adaptation_rate: Number | None = None,
-    members: int | None = None,
-    plan: File | None = None,
     progress: Progress | None = None,
 ) -> Simulation | SampledSimulation:
     """Integrates the closed loops of a certificate, or of the file of one, and attacks the tube: `tubecert simulate`.
@@ -68,59 +100,66 @@ def simulate(
     `spec` is needed where the certificate was read and its plan is in a file. Needs the extra `simulate`. Raises
     `TubecertError` if there is no tube that could be left, or if the specification is another one.
     """
-    texts = number_texts(
-        duration=duration,
-        bandwidth=bandwidth,
-        adaptation_rate=adaptation_rate,
-        runs=runs,
-        seed=seed,
-        replay=replay,
-        members=members,
-    )
-    numbers = simulation_numbers(texts, str)
-    found = result if isinstance(result, Stated) else read(result)
-    system = specification_of(found) if spec is None else spec_of(spec)
+    from tubecert.library.reading import certificate_of
+    from tubecert.library.sampled import SampledCertification
+    from tubecert.library.specification import spec_of
+    from tubecert.report.progress import timed
+
+    found = certificate_of(result)
+    system = _certified(found) if spec is None else spec_of(spec)
+    require_ready(system)
     if isinstance(found, SampledCertification):
-        given = {"controllers": controllers, "gains": gains, "plan": plan, **texts}
-        require_nothing_of_a_metric(given, str)
-        return sampled_of(found, system, numbers, timed(progress))
-    require_extra()
-    chosen = controllers_of(controllers, str)
-    one_of("gains", gains, words_of(ADAPTIVE))
+        return _sampled(found, system, timed(progress), duration=exact(duration), runs=runs, seed=seed)
+    from tubecert.executor import Serial
+    from tubecert.library.simulation import Simulation
+    from tubecert.library.workers import workers_of
+    from tubecert.simulation.adaptive import campaign, families
     from tubecert.simulation.adaptive.reading import adopted, require_tube
+    from tubecert.simulation.adaptive.setting import Choice, loop_of
+    from tubecert.spec import Simulation as Section
 
-    wishes = wishes_of(system, numbers, chosen, gains, plan)
-    require_members(system, wishes, str)
-    system = adopted(system, found.result)
+    default, system = system.simulation or Section(), adopted(system, found.result)
     require_tube(found.result)
-    campaign = campaign_of(system, found.result, wishes, timed(progress))
-    return Simulation(campaign=campaign, compared_with=found.hash)
-
-
-def sampled_of(
-    found: SampledCertification, system: Spec, numbers: SimulationNumbers, report: Progress | None
-) -> SampledSimulation:
-    """The same of a sampled loop."""
-    from tubecert.certificate.belonging import as_set
-    from tubecert.simulation.sampled.campaign import simulate as campaign
-    from tubecert.simulation.sampled.setting import setting_of
-
-    require_extra(("matplotlib",))
-    sampled_simulation.require_tube(found)
-    compared(system, found.result).require(system, "the certificate")
-    default, system = system.simulation or Section(), as_set(system, found.result.spec.settings)
-    own = campaign(
-        setting_of(system, found.result, numbers.duration),
-        found.hash,
-        sampled_simulation.compiled(found.certificate),
-        runs=_first(numbers.runs, default.runs, RUNS),
-        seed=_first(numbers.seed, default.seed, SEED),
-        report=report,
+    runs, seed = _first(runs, default.runs, RUNS), _first(seed, default.seed, 0)
+    setting, drawing = _setting(system, found.result, exact(duration), seed, plan)
+    choice = Choice(
+        source=name_of(gains or default.gains or DISTANCE.option).option,
+        bandwidth=exact(bandwidth),
+        adaptation_rate=exact(adaptation_rate),
     )
-    return SampledSimulation(campaign=own)
+    names = dict.fromkeys(controllers or default.controllers or ("ccm", "l1"))
+    loops = [loop_of(setting, cast("Controller", name), choice) for name in names]
+    asked, report = members or MEMBERS, timed(progress)
+    each = runs if drawing is None else -(-runs // asked)
+    workers = workers_of(jobs, scheduler) or Serial()
+    own = campaign.simulate(
+        setting, loops, count=each, seed=seed, replay=replay, report=report, executor=workers
+    )
+    further = asked - 1  # the first plan has an adversary of its own
+    if drawing is not None and each and further and not own.interrupted:
+        plans = families.members_of(drawing, seed, range(1, asked))
+        others = campaign.follow(setting, loops, plans, asked=further, each=each, seed=seed, report=report)
+        own = replace(own, members=others, interrupted=others is None or others.plans < further)
+    return Simulation(campaign=own, compared_with=found.hash)
 
 
-def specification_of(found: Certification | SampledCertification) -> Spec:
+def require_ready(system: Spec) -> None:
+    """Raises `SpecError` for what is asked in vain of a specification, and without what only this needs."""
+    if system.hardware is not None:
+        require_nothing_of_a_metric()
+    missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
+    if missing:
+        message = f"simulate needs {' and '.join(missing)}"
+        help = "install tubecert with its extra: pip install 'tubecert[simulate]'"
+        raise SpecError([Finding(code="TC122", message=message, help=help)])
+    of_families = [named(name) for name in ("members", "plan") if asker().given.get(name) is not None]
+    if of_families:
+        from tubecert.simulation.adaptive.reading import require_family
+
+        require_family(system, of_families)
+
+
+def _certified(found: Certification | SampledCertification) -> Spec:
     """What was certified; raises `SpecError` if the certificate does not say all of it."""
     try:
         return found.specification.spec
@@ -130,186 +169,92 @@ def specification_of(found: Certification | SampledCertification) -> Spec:
         raise SpecError([*error.findings, Finding(code="TC100", message=message, help=help)]) from None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Wishes:
-    """What is asked for, then the specification's section `simulation`, then defaults."""
-
-    controllers: tuple[str, ...]
-    gains: str
-    runs: int
-    seed: int
-    replay: int | None
-    duration: Fraction | None
-    bandwidth: Fraction | None
-    adaptation_rate: Fraction | None
-    members: int | None
-    plan: str | None
-
-
-def require_extra(names: Sequence[str] = EXTRA) -> None:
-    """Raises `SpecError` without the libraries that nothing else needs."""
-    missing = [name for name in names if importlib.util.find_spec(name) is None]
-    if missing:
-        message = f"simulate needs {' and '.join(missing)}"
-        help = "install tubecert with its extra: pip install 'tubecert[simulate]'"
-        raise SpecError([Finding(code="TC122", message=message, help=help)])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimulationNumbers:
-    """The numbers that a simulation may be asked with, exact; None: what the specification, or a default, says."""
-
-    epsilon: Fraction | None
-    rho_a: Fraction | None
-    duration: Fraction | None
-    bandwidth: Fraction | None
-    adaptation_rate: Fraction | None
-    runs: int | None
-    seed: int | None
-    replay: int | None
-    members: int | None
-
-
-def simulation_numbers(given: Mapping[str, str | None], named: Named) -> SimulationNumbers:
-    """The numbers of a simulation; raises `SpecError` with everything that is wrong with them."""
-    numbers = Numbers()
-
-    def positive(name: str) -> Fraction | None:
-        return numbers.positive(named(name), given.get(name))
-
-    def gain(name: str) -> Fraction | None:
-        return numbers.gain(named(name), given[name])
-
-    def whole(name: str) -> int | None:
-        return numbers.whole(named(name), given[name])
-
-    found = SimulationNumbers(
-        epsilon=positive("epsilon"),
-        rho_a=positive("rho_a"),
-        duration=positive("duration"),
-        bandwidth=gain("bandwidth"),
-        adaptation_rate=gain("adaptation_rate"),
-        runs=whole("runs"),
-        seed=whole("seed"),
-        replay=whole("replay"),
-        members=numbers.count(named("members"), given["members"]),
-    )
-    numbers.check()
-    return found
-
-
-def controllers_of(given: str | Sequence[str] | None, named: Named) -> tuple[str, ...]:
-    """The loops that are asked for; raises `SpecError` for a name that is none."""
-    from tubecert.spec.scene import CONTROLLERS
-
-    parts = given.split(",") if isinstance(given, str) else given or ()
-    words = tuple(dict.fromkeys(word.strip() for word in parts if word.strip()))
-    for word in words:
-        if word not in CONTROLLERS:
-            help = suggestion(word, CONTROLLERS, what="controllers")
-            message = f"{named('controllers')}: {word[:40]!r} is no controller"
-            raise SpecError([Finding(code="TC112", message=message, help=help)])
-    return words
-
-
-def require_members(system: Spec, wishes: Wishes, named: Named) -> None:
-    """Raises TC708 where a plan of a family is asked for, and there is no family."""
-    from tubecert.simulation.adaptive.reading import require_family
-
-    asked = ("members", wishes.members), ("plan", wishes.plan)
-    require_family(system, [named(name) for name, value in asked if value is not None])
-
-
-def wishes_of(
-    system: Spec,
-    numbers: SimulationNumbers,
-    chosen: tuple[str, ...],
-    gains: str | None,
-    plan: File | None = None,
-) -> Wishes:
-    """What is simulated of a specification."""
-    default = system.simulation or Section()
-    return Wishes(
-        controllers=chosen or default.controllers or ("ccm", "l1"),
-        gains=name_of(gains or default.gains or DISTANCE.option).option,
-        runs=_first(numbers.runs, default.runs, RUNS),
-        seed=_first(numbers.seed, default.seed, SEED),
-        replay=numbers.replay,
-        duration=numbers.duration,
-        bandwidth=numbers.bandwidth,
-        adaptation_rate=numbers.adaptation_rate,
-        members=numbers.members,
-        plan=None if plan is None else os.fspath(plan),
-    )
-
-
 def _first(asked: int | None, default: int | None, otherwise: int) -> int:
     return asked if asked is not None else otherwise if default is None else default
 
 
-def campaign_of(
-    system: Spec,
-    result: Result,
-    wishes: Wishes,
-    report: Progress | None,
-    executor: Executor = _HERE,
-) -> Campaign:
-    """Every loop that is wished for, integrated and attacked; random runs are those of the `executor`."""
-    from tubecert.simulation.adaptive.campaign import follow
-    from tubecert.simulation.adaptive.campaign import simulate as campaign
-    from tubecert.simulation.adaptive.families import members_of
-    from tubecert.simulation.adaptive.setting import Choice, loop_of
-
-    setting, drawing = _setting(system, result, wishes)
-    choice = Choice(
-        source=wishes.gains,
-        bandwidth=wishes.bandwidth,
-        adaptation_rate=wishes.adaptation_rate,
-    )
-    names = dict.fromkeys(wishes.controllers)
-    loops = [loop_of(setting, cast("Controller", name), choice) for name in names]
-    asked = MEMBERS if wishes.members is None else wishes.members
-    each = wishes.runs if drawing is None else -(-wishes.runs // asked)
-    own = campaign(
-        setting,
-        loops,
-        count=each,
-        seed=wishes.seed,
-        replay=wishes.replay,
-        report=report,
-        executor=executor,
-    )
-    further = asked - 1  # the first plan has an adversary of its own
-    if drawing is None or not each or not further or own.interrupted:
-        return own
-    plans = members_of(drawing, wishes.seed, range(1, asked))
-    found = follow(setting, loops, plans, asked=further, each=each, seed=wishes.seed, report=report)
-    return replace(own, members=found, interrupted=found is None or found.plans < further)
-
-
-def _setting(system: Spec, result: Result, wishes: Wishes) -> tuple[Setting, Drawing | None]:
+def _setting(
+    system: Spec, result: Result, duration: Fraction | None, seed: int, path: File | None
+) -> tuple[Setting, Drawing | None]:
     """The setting; of a family that of the plan that is given, or of a random one, and what draws others."""
     from tubecert.model import build
     from tubecert.simulation.adaptive.families import drawing_of, members_of
     from tubecert.simulation.adaptive.setting import horizon_of, setting_of
+    from tubecert.trajectory.make import plan_of
 
     if system.trajectory.bundle is None:
-        return setting_of(system, result, wishes.duration), None
+        return setting_of(system, result, duration), None
     model = build(system)
-    if wishes.plan is not None:
-        own = _member(system, wishes.plan)
-        return setting_of(own, result, wishes.duration, plan_of(own, model)), None
-    drawing = drawing_of(system, model, horizon_of(system, wishes.duration))
-    ((plan, _),) = members_of(drawing, wishes.seed, [0])
-    return setting_of(system, result, wishes.duration, plan), drawing
+    if path is not None:
+        own = _member(system, os.fspath(path))
+        return setting_of(own, result, duration, plan_of(own, model)), None
+    drawing = drawing_of(system, model, horizon_of(system, duration))
+    ((plan, _),) = members_of(drawing, seed, [0])
+    return setting_of(system, result, duration, plan), drawing
 
 
 def _member(system: Spec, path: str) -> Spec:
     """The specification of a plan in a file that is proven to be one of the family; raises `SpecError` if not."""
     from tubecert.pipeline.membership import member_spec, membership
+    from tubecert.printable import visible
 
     own = member_spec(path, system)
     missed = [item for item in membership(own, system, visible(path)) if item.severity is Severity.ERROR]
     if missed:
         raise SpecError(missed)
     return own
+
+
+def _sampled(
+    found: SampledCertification,
+    system: Spec,
+    report: Progress | None,
+    *,
+    duration: Fraction | None,
+    runs: int | None,
+    seed: int | None,
+) -> SampledSimulation:
+    """The same of a sampled loop."""
+    from tubecert.certificate.belonging import as_set
+    from tubecert.library.sampled import compared
+    from tubecert.library.simulation import SampledSimulation
+    from tubecert.simulation.sampled.campaign import simulate as campaign
+    from tubecert.simulation.sampled.setting import setting_of
+    from tubecert.spec import Simulation as Section
+
+    result = found.result
+    if not result.tube or result.controller is None or result.nominal is None:
+        reason = found.reasons[0].message if found.reasons else "nothing was found"
+        message = f"there is no tube that a simulation could leave ({found.verdict}: {reason})"
+        error = TubecertError([Finding(code="TC703", message=message, help="tubecert certify tells more")])
+        error.exit_code = found.verdict.exit_code
+        raise error
+    compared(system, result).require(system, "the certificate")
+    default, system = system.simulation or Section(), as_set(system, result.spec.settings)
+    own = campaign(
+        setting_of(system, result, duration),
+        found.hash,
+        _compiled(found.certificate),
+        runs=_first(runs, default.runs, RUNS),
+        seed=_first(seed, default.seed, 0),
+        report=report,
+    )
+    return SampledSimulation(campaign=own)
+
+
+def _compiled(certificate: SampledCertificate) -> Controllers | None:
+    """The exported C code as the controller; None where there is none to export, or no compiler."""
+    from tubecert.controller.compiled import Controller
+    from tubecert.controller.data import data_of
+
+    try:
+        data = data_of(certificate)
+        Controller(data)
+    except TubecertError:
+        return None
+
+    def made(lanes: int) -> Step:
+        code, handed = Controller(data, lanes), data.plan.at is None
+        return lambda y, x, u: code.step(y.T, *((x.T, u.T) if handed else ())).T
+
+    return made

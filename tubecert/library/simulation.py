@@ -1,30 +1,64 @@
-"""A campaign of runs, as a value: its outcome, its curves, its figures."""
+"""Campaigns of runs as values: what came out, curves, figures; of loops that adapt, and of sampled ones."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tubecert.enclosure.interval import Array
-from tubecert.library.specification import File
-from tubecert.records import Json
+from tubecert.library.shown import Shown
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.figure import Figure
 
+    from tubecert.enclosure.interval import Array
+    from tubecert.library.specification import File
+    from tubecert.records import Json
     from tubecert.report.page import Page
     from tubecert.simulation.adaptive.campaign import Campaign, Outcome
     from tubecert.simulation.adaptive.loops import Runs
+    from tubecert.simulation.sampled.campaign import Campaign as SampledCampaign
 
 
-OUTCOMES: Final = ("falsified", "tube left")  # those that are bad news
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class _Campaign(Shown):
+    """What was simulated, and whether it falsified anything: that it did not proves nothing."""
+
+    campaign: Any = field(repr=False)
+
+    @property
+    def outcome(self) -> str:
+        """`not falsified`, `falsified`, `no result` or `interrupted`; also `tube left`, `nothing claimed`."""
+        raise NotImplementedError
+
+    @property
+    def falsified(self) -> bool:
+        """Whether a run was outside of what is proven, or a loop that adapts left the tube."""
+        return self.outcome in ("falsified", "tube left")
+
+    def figure(self, name: str = "tube_use") -> Figure:
+        """A figure; draw into its axes what you like.
+
+        `tube_use` or `plane`; of loops that adapt also `states`, `inputs` or `monte_carlo`. Raises `KeyError` for a
+        name that is none, or of which there is nothing to draw.
+        """
+        from tubecert.simulation.figures import drawn
+
+        found = drawn(self._drawers(), name, self.campaign)
+        if found is None:
+            raise KeyError(f"{name}: there is nothing that it could show")
+        return found
+
+    def _drawers(self) -> Mapping[str, Any]:
+        raise NotImplementedError
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Simulation:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Simulation(_Campaign):
     """What was simulated, and whether it falsified anything: that it did not proves nothing.
 
     `campaign` has every run; `summary` is what `summary.json` holds; `compared_with` the hash of the certificate.
@@ -37,11 +71,6 @@ class Simulation:
     def outcome(self) -> Outcome:
         """`not falsified`, `falsified`, `tube left`, `no result`, `interrupted` or `nothing claimed`."""
         return self.campaign.outcome
-
-    @property
-    def falsified(self) -> bool:
-        """Whether a promise of the certificate was broken, or a loop that adapts left the tube."""
-        return self.outcome in OUTCOMES
 
     @property
     def summary(self) -> Json:
@@ -67,19 +96,6 @@ class Simulation:
         """The states (K, n) of that run."""
         return np.asarray(self.run(controller).x[0])
 
-    def figure(self, name: str = "states") -> Figure:
-        """A figure: `states`, `plane`, `inputs`, `tube_use` or `monte_carlo`; draw into its axes what you like.
-
-        Raises `KeyError` for a name that is none, or of which there is nothing to draw.
-        """
-        from tubecert.simulation.adaptive.figures import DRAWERS
-        from tubecert.simulation.figures import drawn
-
-        found = drawn(DRAWERS, name, self.campaign)
-        if found is None:
-            raise KeyError(f"{name}: nothing was simulated that it shows")
-        return found
-
     def save(self, folder: File) -> list[str]:
         """Write data, figures and the summary into a folder, as the command does; their names.
 
@@ -91,20 +107,56 @@ class Simulation:
         with prepared(os.fspath(folder)):
             return write(os.fspath(folder), self.campaign, certificate=self.compared_with)
 
-    def __str__(self) -> str:
-        from tubecert.report.text import headline
+    def _drawers(self) -> Mapping[str, Any]:
+        from tubecert.simulation.adaptive.figures import DRAWERS
 
-        return headline(self._page()).plain
-
-    def __repr__(self) -> str:
-        return f"<Simulation: {self}>"
-
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-
-        return notebook.of_page(self._page())
+        return DRAWERS
 
     def _page(self) -> Page:
         from tubecert.report.simulation import page_of
+
+        return page_of(self.campaign)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class SampledSimulation(_Campaign):
+    """What was simulated of a sampled loop, and whether it falsified anything: that it did not proves nothing.
+
+    `campaign` has what was seen of every run.
+    """
+
+    campaign: SampledCampaign = field(repr=False)
+
+    @property
+    def outcome(self) -> str:
+        """`not falsified`, `falsified`, `no result` or `interrupted`."""
+        return self.campaign.outcome
+
+    @property
+    def runs(self) -> int:
+        """How many runs were made."""
+        return self.campaign.runs
+
+    @property
+    def summary(self) -> Json:
+        """Everything that was found, as plain data; there is none before the first runs are finished."""
+        return self.campaign.summary
+
+    def save(self, folder: File) -> list[str]:
+        """Write summary, runs and, of a whole campaign, figures into a folder; their names. Raises `TargetError`."""
+        from tubecert.simulation.folder import prepared, written_to
+        from tubecert.simulation.sampled.figures import DRAWERS, files
+
+        with prepared(os.fspath(folder)):
+            figures = [f"{name}.png" for name in DRAWERS]
+            return written_to(os.fspath(folder), self.summary, files(self.campaign), figures)
+
+    def _drawers(self) -> Mapping[str, Any]:
+        from tubecert.simulation.sampled.figures import DRAWERS
+
+        return DRAWERS
+
+    def _page(self) -> Page:
+        from tubecert.report.sampled_simulation import page_of
 
         return page_of(self.campaign)

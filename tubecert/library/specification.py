@@ -6,13 +6,16 @@ In: what a user has. Out: a `Specification`, which holds the `Spec` that command
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
+from tubecert.asking import asker, named, text_of
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
+from tubecert.errors import SpecError
+from tubecert.findings import Finding, NamedPlace
 from tubecert.library import plain
 from tubecert.library.plain import Data, Plain
 from tubecert.spec import Setting, Spec, canonical
@@ -104,18 +107,47 @@ def specification(data: Data | str) -> Specification:
 def spec_of(source: Specifiable, settings: Sequence[Setting] = (), reads: Reads = "whole") -> Spec:
     """The specification in a source, as far as it `reads` (`spec.load`); raises `SpecError`."""
     if isinstance(source, Specification):
-        kept = [Setting(path=path, text=text) for path, text in source.spec.settings]
-        spec = again(source.spec, [*kept, *settings]) if settings else source.spec
+        spec = again(source.spec, [*settings_in(source.spec), *settings]) if settings else source.spec
         return whole(spec) if reads == "whole" else spec
-    text = _source(source) if isinstance(source, Mapping) else read_source(os.fspath(source))
-    return load_source(text, settings, reads)
+    return load_source(source_of(source)[0], settings, reads)
 
 
-def settings_of(given: Data) -> list[Setting]:
+def settings_in(spec: Spec | None) -> list[Setting]:
+    """The keys of a specification that were set."""
+    return [] if spec is None else [Setting(path=path, text=text) for path, text in spec.settings]
+
+
+def require_once(settings: Iterable[Setting]) -> None:
+    """Raises `SpecError` for everything asked that says what a key says that was set in the specification."""
+    findings = []
+    for setting in settings:
+        for name, kind in asker().words.items():
+            if kind.sets and asker().given.get(name) is not None and setting.meets(kind.sets):
+                message = f"{named(name)} is given, too, and says what {kind.sets} is"
+                place = NamedPlace(
+                    file=setting.place, line=1, column=1, source=str(setting), width=len(setting.path)
+                )
+                findings.append(
+                    Finding(code="TC104", message=message, location=place, help="keep one of them")
+                )
+    if findings:
+        raise SpecError(findings)
+
+
+def settings_of(given: Data | Sequence[Setting]) -> list[Setting]:
     """Keys that are set, with the texts of their values; raises `SpecError`."""
+    if not isinstance(given, Mapping):
+        return list(given)
     return [
         Setting.of(f"{key}={plain.entry_text(value, str(key))}", "settings") for key, value in given.items()
     ]
+
+
+def source_of(spec: Specifiable) -> tuple[Source, Spec | None]:
+    """The text of a specification, which need not be valid yet, and the specification if it is one."""
+    if isinstance(spec, Specification):
+        return Source.of(spec.spec.path, spec.spec.source), spec.spec
+    return (_source(spec) if isinstance(spec, Mapping) else read_source(text_of("spec", spec))), None
 
 
 def _source(data: Data | str) -> Source:

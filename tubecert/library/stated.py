@@ -16,6 +16,7 @@ from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
+from tubecert.library.shown import Shown
 from tubecert.library.specification import File, Specification
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.spec import load_text
@@ -33,7 +34,7 @@ C = TypeVar("C", bound="AnyCertificate")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
-class Stated(Generic[C]):
+class Stated(Shown, Generic[C]):
     """A certificate as a value: `certificate` has every key of it as a value, `text` is its file.
 
     `given` is the specification as it was asked about, if it was.
@@ -103,18 +104,8 @@ class Stated(Generic[C]):
         """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`."""
         file.write_text(os.fspath(path), self.text, "choose another file")
 
-    def __str__(self) -> str:
-        from tubecert.report.text import headline
-
-        return headline(page_of(self.certificate, all_of_it=False)).plain
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self}>"
-
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-
-        return notebook.of_page(page_of(self.certificate, all_of_it=False))
+    def _page(self) -> Page:
+        return page_of(self.certificate, all_of_it=False)
 
 
 def page_of(

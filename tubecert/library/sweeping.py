@@ -2,41 +2,43 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-import numpy as np
-
-from tubecert import certificate
+from tubecert.asking import (
+    METRIC,
+    Choice,
+    Exact,
+    Flag,
+    Number,
+    Text,
+    exact,
+    question,
+    require_nothing_of_a_metric,
+    text_of_number,
+)
 from tubecert.errors import SpecError
-from tubecert.executor import Executor, chosen
-from tubecert.files import replace
 from tubecert.findings import Finding
-from tubecert.library.asked import Named, effort_numbers, jobs_of, require_nothing_of_a_metric
-from tubecert.library.plain import Number, number_text, number_texts
-from tubecert.library.reading import read
-from tubecert.library.specification import NAME, File, Specifiable, spec_of
-from tubecert.library.workers import cluster_at
-from tubecert.progress import Progress
-from tubecert.report import sweep as told
-from tubecert.report.progress import timed
-from tubecert.report.sweep import Row, SweepTable
-from tubecert.spec import Setting
-from tubecert.stages.options import Options
-from tubecert.sweep.grid import Axis
-from tubecert.sweep.point import Task
-from tubecert.sweep.run import Sweep
+from tubecert.library.certifying import BUDGET, DECIDING, SCHEDULER
+from tubecert.library.shown import Shown
 
 if TYPE_CHECKING:
     from tubecert.enclosure.interval import Array
     from tubecert.library.certification import Certification
+    from tubecert.library.plain import Data
     from tubecert.library.sampled import SampledCertification
+    from tubecert.library.specification import File, Specifiable
+    from tubecert.progress import Progress
+    from tubecert.report.page import Page
     from tubecert.report.quantities import Value
+    from tubecert.report.sweep import Row, SweepTable
+    from tubecert.spec import Setting
+    from tubecert.sweep.grid import Axis
+    from tubecert.sweep.run import Sweep
 
 REMEDY: Final = "the folder of a sweep must stay there while it runs"
 Range: TypeAlias = str | Iterable[Number]
@@ -76,11 +78,13 @@ class SweptPoint:
 
     def certification(self) -> Certification | SampledCertification:
         """The certificate; raises `TargetError` where there is none."""
+        from tubecert.library.reading import read
+
         return read(self.file)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Swept:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Swept(Shown):
     """A sweep: a certificate for every point, in a folder, with a table and figures.
 
     `points` are in the order of the ranges, the last of which changes first.
@@ -105,19 +109,18 @@ class Swept:
 
         An array (N,). Raises `KeyError` for what no point has.
         """
+        from tubecert.library.stated import array
+
         if key in self.keys:
             axis = self.table.axes[self.keys.index(key)]
             values = dict(zip(axis.texts, axis.numbers or (), strict=False))
-            found = [values.get(each.settings[key], np.nan) for each in self.points]
+            found = [values.get(each.settings[key]) for each in self.points]
         elif any(each.key == key for each in self.table.columns):
             quantities = [row.found.get(key) for row in self.table.rows]
-            numbers = [None if each is None else each.number for each in quantities]
-            found = [np.nan if number is None else number for number in numbers]
+            found = [None if each is None else each.number for each in quantities]
         else:
             raise KeyError(key)
-        column = np.array(found, dtype=float)
-        column.flags.writeable = False
-        return column
+        return array([float("nan") if number is None else number for number in found])
 
     @property
     def broken(self) -> bool:
@@ -129,24 +132,34 @@ class Swept:
         """The table as comma-separated values."""
         return self.table.csv()
 
-    def __str__(self) -> str:
-        page = told.page_of(self.table)
-        return f"{page.name}: {page.summary}"
+    def _page(self) -> Page:
+        from tubecert.report.sweep import page_of
 
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-
-        return notebook.of_page(told.page_of(self.table))
+        return page_of(self.table)
 
 
+@question({
+    "metric": Text("Metric file (JSON) in place of the specification's.", "FILE", sets="metric", of=METRIC),
+    "conditions": Choice(
+        "Which certificate decides the verdict; all are always computed.  [conditions.decides, or A]",
+        words=DECIDING,
+        of=METRIC,
+    ),
+    "gap": Exact("As for certify.", below=1, of=METRIC),
+    "budget": BUDGET,
+    "jobs": Exact("Points certified at a time.", whole=True),
+    "scheduler": Text(SCHEDULER.help, SCHEDULER.metavar),
+    "parquet": Flag("The table as Parquet, too; needs pyarrow, which is no part of tubecert."),
+})  # fmt: skip
 def sweep(
     spec: Specifiable,
-    over: Mapping[str, Range],
+    over: Mapping[str, Range] | Iterable[str],
     *,
     folder: File,
+    settings: Data | Sequence[Setting] = (),
     metric: File | None = None,
     conditions: str | None = None,
-    gap: Number | None = None,
+    gap: Number = "1/100",
     budget: int | None = None,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -156,59 +169,64 @@ def sweep(
     """Certify a specification with every combination of values of some keys: `tubecert sweep`.
 
     `over`: by key a range as the command takes it (`".1:.6:6"`, `"100:2000:log5"`), or values. What is in `folder` from
-    an interrupted sweep that is the same is used. `metric` is a file. Points are shared by `jobs` processes (then the
-    caller's own code stands below `if __name__ == "__main__":`) or the workers of the Dask cluster at `scheduler`.
+    an interrupted sweep that is the same is used. `settings` are as those of `load`. `metric` is a file. Points are
+    shared by `jobs` processes (then the caller's own code stands below `if __name__ == "__main__":`) or the workers of
+    the Dask cluster at `scheduler`.
 
     Raises `SpecError` where no point has a specification that can be read, `TargetError` for a folder of another sweep.
     """
-    numbers = effort_numbers(number_texts(gap=gap, budget=budget))
-    file = None if metric is None else Path(metric)
-    axes = axes_of(f"{key}={_range_text(values, key)}" for key, values in over.items())
-    whole = spec_of(spec)
-    task = Task(
-        path=whole.path,
-        text=whole.source,
-        fixed=tuple(Setting(path=path, text=text) for path, text in whole.settings),
-        options=numbers.options(conditions=conditions, metric=file),
-        folder=Path(os.fspath(folder)).resolve(),
-    )
-    cluster = None if scheduler is None else cluster_at(scheduler, "scheduler")
-    return swept(task, axes, cluster, jobs_of("jobs", str(jobs)) or 1, timed(progress), parquet=parquet)
+    from tubecert.executor import chosen
+    from tubecert.library.specification import NAME, require_once, settings_in, settings_of, source_of
+    from tubecert.library.workers import cluster_at
+    from tubecert.pipeline import Options
+    from tubecert.report.progress import timed
+    from tubecert.report.sweep import SweepTable, can_write_parquet
+    from tubecert.sweep.point import Task
+    from tubecert.sweep.run import Sweep
 
-
-def swept(
-    task: Task,
-    axes: Sequence[Axis],
-    cluster: Executor | None,
-    jobs: int,
-    progress: Progress | None,
-    *,
-    parquet: bool,
-    named: Named = str,
-) -> Swept:
-    """Certify what is missing, then write the table of all. Raises as `sweep` does."""
-    if parquet and not told.can_write_parquet():
+    axes = _axes(over)
+    source, own = source_of(spec)
+    fixed = (*settings_in(own), *settings_of(settings))
+    require_once(fixed)
+    if parquet and not can_write_parquet():
         message, help = "a table in Parquet needs pyarrow", "pip install pyarrow, or read table.csv"
         raise SpecError([Finding(code="TC122", message=message, help=help)])
+    cluster = None if scheduler is None else cluster_at(scheduler)
+    place, usual = Path(folder), Options()
+    task = Task(
+        path=source.file,
+        text=source.text,
+        fixed=fixed,
+        options=Options(
+            metric=None if metric is None else Path(metric),
+            conditions=conditions,
+            gap=exact(gap) or usual.gap,
+            budget=budget or usual.budget,
+        ),
+        folder=place if cluster is None else place.resolve(),
+    )
     whole = Sweep.of(task, axes)
     if whole.first().hardware is not None:
-        usual, asked = Options(), task.options
-        given = {name: getattr(asked, name) for name in ("metric", "conditions", "gap", "budget")}
-        require_nothing_of_a_metric(
-            {name: own for name, own in given.items() if own != getattr(usual, name)}, named
-        )
+        require_nothing_of_a_metric()
     if cluster is not None:
         _require_paths(whole)
-    whole.run(cluster or chosen(jobs, len(whole.points)), progress)
+    whole.run(cluster or chosen(jobs, len(whole.points)), timed(progress))
     name = whole.first().name if task.path == NAME else Path(task.path).stem
     table = SweepTable.of(name, axes, whole.outcomes())
     return Swept(table=table, folder=task.folder, files=_written(task.folder, table, parquet=parquet))
 
 
-def axes_of(words: Iterable[str]) -> list[Axis]:
+def _axes(over: Mapping[str, Range] | Iterable[str]) -> list[Axis]:
     """The ranges; raises `SpecError` with everything that is wrong with them."""
-    axes: list[Axis] = []
-    findings: list[Finding] = []
+    from tubecert.sweep.grid import Axis
+
+    words: Any = over
+    if isinstance(over, Mapping):
+        words = [
+            f"{key}={values if isinstance(values, str) else ','.join(text_of_number(each, key) for each in values)}"
+            for key, values in over.items()
+        ]
+    axes, findings = list[Axis](), list[Finding]()
     for each in words:
         try:
             axes.append(Axis.of(each))
@@ -219,22 +237,22 @@ def axes_of(words: Iterable[str]) -> list[Axis]:
     return axes
 
 
-def _range_text(values: Range, key: str) -> str:
-    return values if isinstance(values, str) else ",".join(number_text(value, key) for value in values)
-
-
 def _written(folder: Path, table: SweepTable, *, parquet: bool) -> tuple[str, ...]:
     """Write table, page and figures; their names. Raises `TargetError`."""
+    from tubecert import certificate
+    from tubecert.files import replace
     from tubecert.report.figures_file import svg_file
     from tubecert.report.figures_sweep import sweep_figures, with_figures
     from tubecert.report.html import render_page
+    from tubecert.report.sweep import page_of
 
     texts = {"table.csv": table.csv()}
     if parquet:
         replace(folder / "table.parquet", table.parquet())
     drawn = sweep_figures(table)
-    texts |= {"sweep.html": render_page(with_figures(told.page_of(table), drawn))}
-    texts |= {f"figures/{figure.key.removeprefix('sweep-')}.svg": svg_file(figure) for figure in drawn}
+    texts["sweep.html"] = render_page(with_figures(page_of(table), drawn))
+    for figure in drawn:
+        texts[f"figures/{figure.key.removeprefix('sweep-')}.svg"] = svg_file(figure)
     for name, text in texts.items():
         certificate.write_text(str(folder / name), text, REMEDY)
     return (*texts, *(["table.parquet"] if parquet else []))
@@ -242,11 +260,9 @@ def _written(folder: Path, table: SweepTable, *, parquet: bool) -> tuple[str, ..
 
 def _require_paths(sweep: Sweep) -> None:
     """Raises `SpecError` where workers, whose folder is another, would look for files that are not there."""
-    read = sweep.first().trajectory.table is not None
-    metric = sweep.task.options.metric
-    if (read and not Path(sweep.task.path).is_absolute()) or (
-        metric is not None and not metric.is_absolute()
-    ):
+    metric, table = sweep.task.options.metric, sweep.first().trajectory.table
+    files = [Path(sweep.task.path)] if table is not None else []
+    if not all(file.is_absolute() for file in (*files, *([] if metric is None else [metric]))):
         message = "workers of a cluster read the plan file or the metric file in folders of their own"
         help = "give the specification, and --metric, by paths from the root that are the same everywhere"
         raise SpecError([Finding(code="TC122", message=message, help=help)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 
+from tubecert.asking import named
 from tubecert.errors import SpecError
 from tubecert.executor import Cluster, Executor, Processes, WorkerError
 from tubecert.findings import Finding
@@ -11,20 +12,20 @@ from tubecert.libraries import versions
 from tubecert.printable import visible
 
 
-def workers_of(jobs: int | None, scheduler: str | None, name: str) -> Executor | None:
+def workers_of(jobs: int | None, scheduler: str | None) -> Executor | None:
     """A cluster by its address, else as many processes as are wanted; None: this process alone.
 
-    `name` is what findings call the address. Raises `SpecError` as `cluster_at` does.
+    Raises `SpecError` as `cluster_at` does.
     """
     if scheduler is not None:
-        return cluster_at(scheduler, name)
+        return cluster_at(scheduler)
     return Processes(jobs) if jobs is not None and jobs > 1 else None
 
 
-def cluster_at(address: str, name: str = "--scheduler") -> Cluster:
+def cluster_at(address: str) -> Cluster:
     """The cluster at an address; raises `SpecError` if there is none, or if its workers could find other results."""
     if importlib.util.find_spec("distributed") is None:
-        message = f"{name} needs distributed"
+        message = f"{named('scheduler')} needs distributed"
         help = "install tubecert with its extra: pip install 'tubecert[cluster]'"
         raise SpecError([Finding(code="TC122", message=message, help=help)])
     cluster, own = Cluster(address), versions()

@@ -1,0 +1,39 @@
+"""`export`: a certificate in; a folder with its controller out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tubecert.asking import Text
+from tubecert.cli.adapter import CERTIFICATE, Output, command
+
+_AFTER = """\b
+Examples:
+  tubecert export plant.certificate.json -o controller
+  cd controller && cc -std=c99 -O2 controller.c selftest.c -o selftest -lm && ./selftest
+  tubecert recheck plant.certificate.json --controller controller
+
+\b
+Exit codes: 0 written; 2 no certificate of a sampled loop, no controller in it, or a folder with files that tubecert
+did not write or that were changed; 1 the certificate says refuted, 4 it says undecided: nothing is written.
+"""
+_WORDS = {
+    "certificate": replace(CERTIFICATE, help="A certificate (JSON) of a sampled loop."),
+    "output": Text("Where to.  [CERT's stem.controller]", "FOLDER", short="-o"),
+}
+
+
+@command(_WORDS, short="Write the controller of a certificate in C.", after=_AFTER)
+def export(how: Output, certificate: str, *, output: str | None = None) -> None:
+    """Write the controller that a certificate of a sampled loop is about: C99, with its data and a self-test."""
+    from tubecert.cli.guard import write_stdout
+    from tubecert.library import exporting
+    from tubecert.printable import visible
+
+    stem = certificate.removesuffix(".json").removesuffix(".certificate")
+    found = exporting.export(certificate, output or f"{stem}.controller")
+    if not how.quiet:
+        write_stdout(
+            f"{visible(found.folder)}: {', '.join(found.files)}\n"
+            f"  {found.work} multiply-adds a sample; README.txt says how to compile and what is covered\n"
+        )
