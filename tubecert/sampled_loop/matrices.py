@@ -1,4 +1,7 @@
-"""Interval matrices: products, blocks, exponentials and their integrals; sums of what is not negative, from above.
+"""Interval matrices: products, blocks, exponentials and their integrals; sums of what is not negative.
+
+What is not negative is added and multiplied in floats, and is off by as many units as there are roundings, one after
+the other, but for what underflows; that is made good once, where it is compared (`theorem`).
 
 Trusted: yes. Implements: theory of the sampled loop, section 2.
 References: S. M. Rump, Acta Numerica 2010; N. J. Higham, Accuracy and Stability, 2002, eq. 3.13.
@@ -19,9 +22,9 @@ from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.outward import down, up
 
 UNIT: Final = 2.0**-53
+ROUNDED: Final = 1e-11  # 90 000 roundings, one after the other, of numbers that are not negative
 _TINY: Final = 1e-300  # covers what underflows in a product
 _ROOT_TINY: Final = 1e-150  # the same below a root
-SUMMED: Final = 1 + 1e-12  # a sum of at most 4000 terms, none negative: 4000 u < 5e-13
 _TERMS: Final = 18
 _MOST: Final = Fraction(1, 2)
 _E: Final = 1.7  # > e^(1/2)
@@ -46,13 +49,13 @@ def stacked(rows: Sequence[Sequence[Interval]]) -> Interval:
 
 
 def lengths(rows: Array) -> Array:
-    """Euclidean lengths of rows of numbers that are not negative, (.., 1), from above."""
-    return np.asarray(np.sqrt(np.sum(rows * rows, axis=-1, keepdims=True)) * SUMMED + _ROOT_TINY)
+    """Euclidean lengths of rows of numbers that are not negative, (.., 1), but for roundings."""
+    return np.asarray(np.sqrt(np.sum(rows * rows, axis=-1, keepdims=True)) + _ROOT_TINY)
 
 
 def total(values: Array, weights: Array) -> Array:
-    """sum_j values[..., j] weights[j] of numbers that are not negative, from above."""
-    return np.asarray(values @ weights * SUMMED + _TINY)
+    """sum_j values[..., j] weights[j] of numbers that are not negative, but for roundings."""
+    return np.asarray(values @ weights + _TINY)
 
 
 class Exponential:
@@ -66,7 +69,7 @@ class Exponential:
 
     def __init__(self, A: Array) -> None:
         self.A, self._one = Interval.exact(A), Interval.exact(np.eye(len(A)))
-        self._norm = Fraction(float(np.max(np.abs(A).sum(axis=1), initial=0.0) * SUMMED))
+        self._norm = Fraction(float(np.max(np.abs(A).sum(axis=1), initial=0.0) * (1 + ROUNDED)))
         self.at = lru_cache(maxsize=None)(self._at)
 
     def _at(self, s: Fraction) -> tuple[Interval, Interval]:

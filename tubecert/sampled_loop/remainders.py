@@ -20,7 +20,7 @@ from tubecert.expression import derivatives
 from tubecert.expression.matrix import jacobian
 from tubecert.model import TIME
 from tubecert.sampled_loop.cells import cells_of, end_of, in_time, largest_jump, steepness
-from tubecert.sampled_loop.matrices import SUMMED, lengths, total
+from tubecert.sampled_loop.matrices import lengths, total
 from tubecert.sampled_loop.setting import PLAN_ROUNDING, Loop, driven
 from tubecert.trajectory.plan import Family
 
@@ -79,7 +79,7 @@ class Remainders:
         if self.steep is None:
             return largest_jump(loop)
         span = fraction_bounds(loop.sample_time if loop.hold == "left" else loop.sample_time / 2)[1]
-        return np.asarray(self.steep * span * (1 + 1e-15))
+        return np.asarray(self.steep * span)
 
     @cached_property
     def defect(self) -> Array:
@@ -109,21 +109,19 @@ class Remainders:
     def rho(self, W: Array, U: Array, size: Array) -> Array:
         """What is left where |e| <= W, |delta| <= U, |eta| <= size: through I and the columns of B, (n + m,)."""
         loop, x = self.loop, self.cells.x
-        weights = np.concatenate([W, U + self.held]) * (1 + 1e-15)
+        weights = np.concatenate([W, U + self.held])
         parts = []
         for level in range(1, _LEVELS + 1):
             share = level / _LEVELS * (1 + 1e-15)
             off = self._off(_wider(x, share * W), _wider(self.cells.u, share * U + self.held))
             parts.append(total(off, weights))
-        bent = np.max(np.mean(parts, axis=0), axis=0) * SUMMED
+        bent = np.max(np.mean(parts, axis=0), axis=0)
         gain = off.max(axis=0)[:, loop.states :]  # |B(x, p) - B| on all of the tube
         moved = total(gain, self._of_inputs(size)) + self._shaken(_wider(x, W))
         sudden = np.zeros(loop.states)
         if not loop.slow:
             sudden[list(loop.unknown)] = self._strangeness[0]
-        return np.concatenate(
-            [(bent + self.defect + sudden + moved) * SUMMED, (self.held + self._slope(W)) * SUMMED]
-        )
+        return np.concatenate([bent + self.defect + sudden + moved, self.held + self._slope(W)])
 
     def _off(self, x: Interval, u: Interval) -> Array:
         """|F_z - (A, B)| on boxes: (N, n, n + m)."""
@@ -152,7 +150,7 @@ class Remainders:
         if self.loop.jumps:
             return np.zeros(m)
         if self.loop.model.h is None:
-            return np.full(m, self.loop.declared[1] * lengths(W)[0] * (1 + 1e-15))
+            return np.full(m, self.loop.declared[1] * lengths(W)[0])
         steep = self._h_run(self._h_slopes, _wider(self._timed.x, W)).magnitude.reshape(m, n + 1, -1)
         return np.asarray(np.max(total(np.ascontiguousarray(steep[:, :n].swapaxes(1, 2)), W), axis=1))
 
@@ -180,7 +178,7 @@ class Remainders:
             h, steep, fast = self.loop.declared
             speed = float(np.max(lengths(self.speed.magnitude.T)))
             size = np.full(len(own), h)
-            return size, np.full(len(own), (fast + steep * speed) * (1 + 1e-15)), size
+            return size, np.full(len(own), fast + steep * speed), size
         size = self._h_run(self._h, _wider(self._timed.x, W)).magnitude.max(axis=1)
         now = np.zeros(1)
         x, _ = self.loop.plan.enclose(now, now)
@@ -213,7 +211,7 @@ class Remainders:
         rows = [*self._strange, *(e for name in loop.names for e in derivatives(self._strange, name))]
         slopes = [e for name, _ in loop.model.parameters for e in derivatives(rows, name)]
         found = self._run(Tape([*rows, *slopes], self._names), x, u).magnitude
-        reach = 0.5 * (self._parameters[:, 1] - self._parameters[:, 0]) * (1 + 1e-12)
+        reach = 0.5 * (self._parameters[:, 1] - self._parameters[:, 0])
         by_slopes = np.moveaxis(found[len(rows) :].reshape(len(reach), len(rows), -1), 0, -1)
         found = np.minimum(found[: len(rows)], total(by_slopes, reach))
         steep = np.full(loop.inputs, np.inf) if self.steep is None else self.steep
@@ -221,7 +219,7 @@ class Remainders:
         size, moved = found[: len(loop.unknown)], found[len(loop.unknown) :]
         with np.errstate(invalid="ignore"):
             rates = np.where(moved > 0, moved * np.repeat(speeds, len(size), axis=0), 0.0)
-        rate = np.sum(rates.reshape(len(speeds), *size.shape), axis=0) * SUMMED
+        rate = np.sum(rates.reshape(len(speeds), *size.shape), axis=0)
         return size.max(axis=1), rate.max(axis=1)
 
     # -- tapes -------------------------------------------------------------------------------------------------------

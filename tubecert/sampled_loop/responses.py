@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
-from tubecert.sampled_loop.matrices import SUMMED, UNIT, Exponential, product, stacked
+from tubecert.sampled_loop.matrices import Exponential, product, stacked, total
 from tubecert.sampled_loop.setting import Controller, Loop
 
 _AT_ONCE: Final = 400_000  # entries of a batch of rows
@@ -80,19 +80,18 @@ class Acting:
                 self._at.append((0.5 * d, stacked([[product(phi, K), product(whole, Interval.exact(H))]])))
             turned = product(A, product(own.at((a + b) / 2)[0], K))
             second = stacked([[product(A, turned), turned[:, K.lo.shape[1] - self._rates :]]]).magnitude
-            self._bent += d**3 / 12 * (swelling(loop.A, (b - a) / 2) @ second) * (1 + 1e-12)
-        self._bent *= SUMMED
+            self._bent += d**3 / 12 * total(swelling(loop.A, (b - a) / 2), second)
 
     def of(self, rows: Array, eta: Array | None = None) -> Array:
         """For rows (N, n) of e, and (N, r) of eta: (N, 1 + n + m + r + r)."""
-        found = self.sized(np.abs(rows) @ self._bent * SUMMED)
+        found = self.sized(total(np.abs(rows), self._bent))
         for weight, G in self._at:
             value = product(Interval.exact(rows), G)
             if eta is not None:
                 whole = np.pad(eta, ((0, 0), (self._bent.shape[1] - self._rates, 0)))
                 value = value + Interval.exact(whole)
             found += weight * self.sized(value.magnitude)
-        return np.asarray(found * SUMMED)
+        return np.asarray(found)
 
     def sized(self, columns: Array) -> Array:
         """Numbers that are not negative, winds weighed by how large they are."""
@@ -127,7 +126,7 @@ class Responses:
         outputs = [*map(own.error, self.nodes), *map(Interval.exact, (own.sent[0], own.memory))]
         first = stacked([[rows] for rows in outputs])
         self.rows = self._proposed(first.mid[:, : own.width], step.mid[:, : own.width])
-        missed = (first.rad[:, : own.width] + self._missed(step[:, : own.width])) * (1 + 4 * UNIT)
+        missed = first.rad[:, : own.width] + self._missed(step[:, : own.width])
         self.now = self._counted(len(missed), xi=missed, heard=first[:, own.width :].magnitude)
         self.passing = self.now.shape[1] - own.width - self._r
         acting, heard = Acting(own, Ts, panels), step[:, own.width :]
@@ -176,8 +175,8 @@ class Responses:
             before, after = self.rows[part], self.rows[part.start + 1 : part.stop + 1]
             off = product(Interval.exact(before.reshape(-1, before.shape[2])), step)
             off = off - Interval.exact(after.reshape(off.lo.shape))
-            missed += np.sum(off.magnitude.reshape(after.shape), axis=0) * SUMMED
-        return np.asarray(missed * (1 + 4 * self.lags * UNIT) * SUMMED)
+            missed += np.sum(off.magnitude.reshape(after.shape), axis=0)
+        return missed
 
     def _batches(self) -> list[slice]:
         size = max(1, _AT_ONCE // self.rows[0].size)
@@ -195,22 +194,20 @@ class Responses:
         return passing, rate, size
 
     def _cumulated(self, parts: tuple[Array, ...]) -> Array:
-        """Sums over the lags before each, from above: k additions, k u."""
+        """Sums over the lags before each."""
         whole = np.concatenate(parts)
-        sums = np.concatenate([np.zeros_like(whole[:1]), np.cumsum(whole, axis=0)])
-        return np.asarray(sums * (1 + 4 * (self.lags + 4) * UNIT))
+        return np.concatenate([np.zeros_like(whole[:1]), np.cumsum(whole, axis=0)])
 
     def _piece(self, acting: Acting, a: Fraction, b: Fraction) -> Array:
         """How far e is from its chord between two nodes (theory, 3.4)."""
         loop, own = self.loop, self.dynamics
         d, middle, r = fraction_bounds(b - a)[1], (a + b) / 2, self._r
-        turned = d * d / 8 * swelling(loop.A, (b - a) / 2) * SUMMED
-        share = np.abs(loop.A) @ turned * SUMMED
-        bent = share @ own.slope(middle).magnitude * SUMMED
+        turned = d * d / 8 * swelling(loop.A, (b - a) / 2)
+        share = total(np.abs(loop.A), turned)
+        bent = total(share, own.slope(middle).magnitude)
         K = np.hstack([*(columns for columns, _ in loop.sudden), loop.R, loop.H, loop.H])
         pushed = product(own.exponential.at(middle)[0], Interval.exact(K)).magnitude
-        of_rate = turned @ pushed[:, pushed.shape[1] - r :]
-        acted = np.hstack([share @ pushed[:, : pushed.shape[1] - r], of_rate]) * SUMMED
+        acted = np.hstack([total(share, pushed[:, : len(K.T) - r]), total(turned, pushed[:, len(K.T) - r :])])
         return self._counted(
             len(bent), xi=bent[:, : own.width], heard=bent[:, own.width :], acting=acting.sized(acted)
         )

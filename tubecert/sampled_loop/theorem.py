@@ -25,7 +25,7 @@ from tubecert.enclosure.processor import require_ieee
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel, domain_findings, unending
 from tubecert.sampled_loop.cells import MOST
-from tubecert.sampled_loop.matrices import SUMMED, UNIT, total
+from tubecert.sampled_loop.matrices import ROUNDED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
 from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage
 from tubecert.sampled_loop.remainders import Remainders, Sizes
@@ -107,25 +107,28 @@ class Inequalities:
         b, direct, spread = self.terms(boxes)
         n, m, nodes = self.loop.states, self.loop.inputs, len(self.responses.nodes)
         e = b[:, : n * nodes].reshape(len(b), nodes, n) + direct
-        within = np.max(np.maximum(e[:, :-1], e[:, 1:]) + spread, axis=1) * (1 + 4 * UNIT)
+        within = np.max(np.maximum(e[:, :-1], e[:, 1:]) + spread, axis=1)
         rest = b[:, n * nodes :]
         rest[0, m:] = 0.0  # (c) is for k >= 1: zeta is 0 at boot
         spans = list(pairwise([*self.starts, self.last + 1]))
         parts = (within, rest[:, :m], rest[:, m:])
-        return Boxes(*(np.array([np.max(own[a:b], axis=0, initial=0.0) for a, b in spans]) for own in parts))
+        most = (np.array([np.max(own[a:b], axis=0, initial=0.0) for a, b in spans]) for own in parts)
+        return Boxes(*(own * (1 + 4 * ROUNDED) for own in most))
 
     def terms(self, boxes: Boxes) -> tuple[Array, Array, Array]:
-        """b of every row (K, R); direct terms at every node (K, nodes, n); what pieces add (K, pieces, n)."""
+        """b of every row (K, R); direct terms at every node (K, nodes, n); what pieces add (K, pieces, n).
+
+        But for roundings; a difference of two sums may be off by those of both.
+        """
         own, k = self.responses, np.arange(self.last + 1)
         (starts, sizes, slow), lag = self.phases(boxes), np.minimum(k, own.lags)
         widest, e = sizes.max(axis=0), slice(own.passing, own.passing + self.loop.states)
         widest[e] = np.maximum(widest[e], self.loop.start.reach)  # zeta and v are 0 at boot
         b = total(own.now, widest) + self.slow(slow) + self.first(k)
-        slack = 8 * (own.lags + 8) * UNIT + 4 * (SUMMED - 1)  # a difference of two sums from above
         for start, end, size in zip(starts, [*starts[1:], self.last + 2], sizes, strict=True):
             answers = total(own.past, size[: own.passing])
             newer, older = np.clip(k - start, 0, lag), np.clip(k - end, 0, lag)
-            b += answers[newer] - answers[older] + slack * answers[newer]
+            b += answers[newer] - answers[older] + 4 * ROUNDED * answers[newer]
         phase = np.searchsorted(starts, k, side="right") - 1
         core = slice(
             own.passing, own.passing + own.rows.shape[2] - own.eta.shape[2]
@@ -135,7 +138,7 @@ class Inequalities:
         direct, spread = (
             np.moveaxis(total(each, sizes.T), -1, 0)[phase] for each in (own.direct, own.pieces)
         )
-        return b * SUMMED, direct, spread
+        return b, direct, spread
 
     def phases(self, boxes: Boxes) -> tuple[list[int], Array, Sizes]:
         """Parts of time in which one stage lasts and commands of the same stages act: first samples, (g,).
@@ -158,15 +161,15 @@ class Inequalities:
         """r_y (n,), r_u (m,), r_z (z,): what the controller's own arithmetic is off by, of every stage (G9)."""
         loop, c, u = self.loop, self.controller, ROUNDING[self.loop.hardware.arithmetic]
         k = c.size + loop.states + 3
-        gamma = k * u / (1 - k * u) * (1 + 1e-15)
+        gamma = k * u / (1 - k * u)
         W, Z = boxes.W.max(axis=0), boxes.Z.max(axis=0)
         above, noise = self.remainders.states_above, loop.noise.each
         y = PLAN_ROUNDING * above + 2 * u * (2 * above + W + noise) + _FLUSHED
-        seen = (W + noise + y) * SUMMED
+        seen = W + noise + y
         planned = self.remainders.inputs_above + self.remainders.held
         delta = gamma * (planned + total(np.abs(c.M), Z) + total(np.abs(c.N), seen)) + _FLUSHED
         state = gamma * (total(np.abs(c.F), Z) + total(np.abs(c.G), seen)) + _FLUSHED
-        return np.concatenate([y, delta, state]) * SUMMED
+        return np.concatenate([y, delta, state])
 
     def slow(self, sizes: Sizes) -> Array:
         """eta by its rate up to the cut, and by its size from there on (D-cut), (K, R)."""
@@ -186,11 +189,10 @@ class Inequalities:
         entry = np.abs(own.eta[upto, rows, column])
         begins = (k <= cut) & (k <= own.lags)  # the row still holds the entry that meets eta(0)
         older, newer = own.size[lag, rows, column], own.size[upto, rows, column]
-        slack = 8 * (own.lags + 8) * UNIT  # a difference of two sums from above
         return (
             own.rate[upto, rows, column],
             np.where(begins, entry, 0.0),
-            np.where(begins, 0.0, entry) + (older - newer + slack * older),
+            np.where(begins, 0.0, entry) + (older - newer + 4 * ROUNDED * older),
         )
 
     def first(self, k: _INDEX) -> Array:
@@ -203,7 +205,7 @@ class Inequalities:
         if start.length:
             known += np.sqrt(np.sum(size * size, axis=-1)) * start.length
         found = np.zeros((len(k), own.rows.shape[1]))
-        found[: len(early)] = known * SUMMED
+        found[: len(early)] = known
         return found
 
 
