@@ -121,15 +121,13 @@ class _Search:
         theta, plant = self.observer.table(weights), self.plant
         if theta is None or not (response := respond(plant, self.observer.sample, theta, SEARCHED)):
             return None
-        if steps == 0:
-            added = response.gain @ self.constant
-            late, ever = (sizes(plant, rows + added) for rows in (response.long_run, response.ever))
-        else:
-            gain = SPARE * response.gain
-            late = settle(plant, gain, response.long_run, steps)[0]
-            rest = rest_at(plant, late)
-            first = sizes(plant, response.ever + gain @ rest)
-            ever = sizes(plant, response.ever + gain @ (0.5 * rest + 0.5 * rest_at(plant, first)))
+        gain, added = (
+            (SPARE * response.gain, 0.0) if steps else (0.0 * response.gain, response.gain @ self.constant)
+        )
+        late = settle(plant, gain, response.long_run + added, steps)[0]
+        rest = rest_at(plant, late)
+        first = sizes(plant, response.ever + added + gain @ rest)
+        ever = sizes(plant, response.ever + added + gain @ (0.5 * rest + 0.5 * rest_at(plant, first)))
         return response, np.array([ever, late])[:, : self.n], ever[self.n :]
 
     def value(self, weights: Array) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
 from typing import Final
 
@@ -121,27 +123,21 @@ def steepness(loop: Loop, count: int) -> Array | None:
 
 
 def largest_jump(loop: Loop) -> Array:
-    """What u* held between knots differs by, at most, within one sample that does not begin at a knot; (m,).
+    """How far apart rows of u* held between knots may be that last at u*_j(t) and at ubar_j, (m,).
 
-    Nothing, if every knot is an instant at which commands begin to act; but at the left end of an interval a computer's
-    time may be that of the interval before.
+    Nothing, if every jump is where commands begin to act; but at the left end of an interval a computer's time may be
+    that of the interval before.
     """
-    knots = loop.plan.knots
+    knots, Ts = loop.plan.knots, loop.sample_time
     if knots is None:
         return np.full(loop.inputs, np.inf)
-    rows = knots.u[:-1]
-    pairs = list(zip(knots.t[1:-1], rows, rows[1:], strict=False))
+    begins, rows = list(knots.t[:-1]), list(knots.u[:-1])
     if loop.afterwards == "repeat":
-        pairs.append((knots.t[-1], rows[-1], rows[0]))
-    jumps = [(t, [abs(b - a) for a, b in zip(before, after, strict=True)]) for t, before, after in pairs]
-    jumps = [(t, sizes) for t, sizes in jumps if any(sizes)]
-    aligned = all(((t - loop.rest) / loop.sample_time).denominator == 1 for t, _ in jumps)
-    if not jumps or (loop.hold == "middle" and aligned):
+        begins, rows = begins + [knots.t[-1] + t for t in begins], rows + rows
+    jumps = [t for t, (a, b) in zip(begins[1:], pairwise(rows), strict=True) if a != b]
+    if loop.hold == "middle" and all(((t - loop.rest) / Ts).denominator == 1 for t in jumps):
         return np.zeros(loop.inputs)
-    times = [t for t, _ in jumps]
-    if loop.afterwards == "repeat":
-        times.append(knots.t[-1] + times[0])
-    closest = min((b - a for a, b in pairwise(times)), default=loop.sample_time)
-    met = int(loop.sample_time / closest) + 1
-    largest = [max(each) for each in zip(*(sizes for _, sizes in jumps), strict=True)]
-    return np.array([fraction_bounds(met * size)[1] for size in largest])
+    span = (Ts if loop.hold == "left" else Ts / 2) * Fraction(1001, 1000)
+    near = (rows[k : bisect_right(begins, end + span)] for k, end in enumerate((*begins[1:], begins[-1])))
+    apart = [[max(each) - min(each) for each in zip(*own, strict=True)] for own in near]
+    return np.array([fraction_bounds(max(each))[1] for each in zip(*apart, strict=True)])
