@@ -97,7 +97,7 @@ def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, No
             where = "" if error.where is None else names[error.where]
             lack = Lack(kind=error.kind, where=where, needed=error.needed, allowed=error.allowed)
             return replace(plain, lacks=(lack,)), notes
-        checked = check(loop, tables, stages, inequalities.recipe, inequalities)
+        checked = check(loop, tables, stages, inequalities.recipe)
         notes = explain(inequalities, stages, tables.evaluations)
         over = {lack.where: lack for lack in checked.lacks if lack.kind == "inputs"}
         result = replace(

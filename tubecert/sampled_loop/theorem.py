@@ -85,12 +85,6 @@ class Inequalities:
         made = Responses(remainders.loop, controller, **sizes)
         return cls(controller, recipe, tuple(starts), made, remainders)
 
-    def about(self, loop: Loop, controller: Controller, recipe: Recipe, starts: Sequence[int]) -> bool:
-        """Whether they are those of a loop and its controller, for a recipe and stages."""
-        own, made = self.responses, (loop, loop, controller, controller, recipe, recipe.lags, tuple(starts))
-        whose = self.loop, own.loop, self.controller, own.controller
-        return (*whose, self.recipe, own.lags, self.starts) == made
-
     @property
     def loop(self) -> Loop:
         """The loop that they are about."""
@@ -219,23 +213,13 @@ class Checked:
     lacks: tuple[Lack, ...] = ()
 
 
-def check(
-    loop: Loop,
-    controller: Controller,
-    stages: Sequence[Stage],
-    recipe: Recipe,
-    inequalities: Inequalities | None = None,
-) -> Checked:
-    """Whether the loop keeps to the stages, for everything that the specification lets happen.
-
-    `inequalities` may be handed in by whoever has them already: those about something else are made again.
-    """
+def check(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: Recipe) -> Checked:
+    """Whether the loop keeps to the stages, for everything that the specification lets happen."""
     require_ieee()
     if not _sound(loop, controller, stages, recipe):
         return Checked(verdict=Verdict.UNDECIDED, lacks=(Lack(kind="not_proven"),))
     starts = [own.start for own in stages]
-    if inequalities is None or not inequalities.about(loop, controller, recipe, starts):
-        inequalities = Inequalities.made(Remainders(loop, recipe.windows), controller, recipe, starts)
+    inequalities = Inequalities.made(Remainders(loop, recipe.windows), controller, recipe, starts)
     above, below = (Boxes.of(stages, loop.model, above=side) for side in (True, False))
     with np.errstate(all="ignore"):  # what is not finite bounds nothing
         found = inequalities.of(above)
