@@ -250,6 +250,10 @@ RANGE = ", parameters: {p: [0.9, 1.1]}"
             0.5, 0, (), (0.1, 2**-24 * 0.1),
         ),
         ({"trajectory": WAVE.replace("cos(t)'", "cos(t) + 0.02'")}, 0.5, 0, (), (0.02, TS / 2)),
+        (
+            {"trajectory": WAVE, "system": scalar("0", "1 + 0.1*x"), "hardware": "{sample_time: 1}"},
+            0.5, 0, (), (0.05 * (sqrt(2) + 0.8125) + 0.05, 0.5),
+        ),
         ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": [[-1]]}, 0.5, 0, (), (0.1 + 0.05, 2**-24)),
         ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": [[-1]], "slow": True}, 0.5, 0, [0.1], (0.05, 2**-24)),
         ({**AT_ONE, "system": scalar("-x", "p", more=RANGE), "A": [[-1]], "slow": True}, 0.5, 4, [0.1], (0.4, 2**-24)),
@@ -282,6 +286,11 @@ def test_rounding_of_singles():
     close(off, [y, 4 * unit * (5 + 5 * unit + 10 * 5)], 1e-3)
     off = asked(loop, controller_of([[-10]], [[0.5]], [[3]], [[7]]))._rounding(boxes)
     close(off, [y, 5 * unit * (5 + 7 * 9 + 10 * 5), 5 * unit * (0.5 * 9 + 3 * 5)], 1e-3)
+    moving = loop_of(trajectory=WAVE, hardware="{sample_time: 1, arithmetic: single}")
+    nothing = Boxes(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 0)))
+    for N in (0, 1e7):
+        off = asked(moving, controller_of([[N]]))._rounding(nothing)
+        close(off, [5 * unit, 4 * unit * (1.5 + N * 5 * unit)], 1e-3)
     still = loop_of(**at, hardware="{sample_time: 0.1, arithmetic: single}")
     found, held = bounds(still, W=2.0), 5 * (1 + unit)  # x' = u, at rest under 5: a defect
     y, u = unit * 1000 + 2 * unit * 2002, 4 * unit * 25
