@@ -51,10 +51,10 @@ class Remainders:
         self._timed = in_time(loop, self.cells)
         self._names = (*loop.names, *(name for name, _ in model.parameters))
         known = driven(model.f, model.B, model.inputs)
-        self._slopes = Tape([e for row in jacobian(loop.field, loop.names) for e in row], self._names)
+        rows = zip(jacobian(loop.field, loop.names), model.E or ((),) * loop.states, strict=True)
+        self._slopes = Tape([e for row in rows for part in row for e in part], self._names)  # F_x, F_u, E
         self._field = Tape(known, self._names)
         self._strange = [loop.field[i] - known[i] for i in loop.unknown]
-        self._E = Tape([e for row in model.E for e in row], self._names)
         ends = [BoxDomain({name: each}).boxes((name,)) for name, each in model.parameters]
         self._parameters = np.array([(lo[0, 0], hi[0, 0]) for lo, hi in ends]).reshape(-1, 2)
         timed = (*model.states, TIME)
@@ -97,37 +97,32 @@ class Remainders:
 
     # -- on the tube -------------------------------------------------------------------------------------------------
 
-    def middle(self) -> tuple[Array, Array, Array]:
+    def middle(self) -> tuple[Array, ...]:
         """Floats in the middle of F_x, F_u and E along the plan: (n, n), (n, m), (n, k)."""
         n, m = self.loop.states, self.loop.inputs
         slopes = self._run(self._slopes, self.cells.x, self.cells.u)
-        E = self._run(self._E, self.cells.x, self.cells.u)
-        both = [0.5 * own.lo.min(axis=1) + 0.5 * own.hi.max(axis=1) for own in (slopes, E)]
-        Fz = both[0].reshape(n, n + m)
-        return Fz[:, :n], Fz[:, n:], both[1].reshape(n, -1)
+        found = (0.5 * slopes.lo.min(axis=1) + 0.5 * slopes.hi.max(axis=1)).reshape(n, -1)
+        return tuple(np.split(found, [n, n + m], axis=1))
 
     def rho(self, W: Array, U: Array, size: Array) -> Array:
         """What is left where |e| <= W, |delta| <= U, |eta| <= size: through I and the columns of B, (n + m,)."""
-        loop, x = self.loop, self.cells.x
-        weights = np.concatenate([W, U + self.held])
-        parts = []
+        loop, n, z = self.loop, self.loop.states, len(self.loop.names)
+        nominal, weights, parts = np.hstack([loop.A, loop.B, loop.E]), np.concatenate([W, U + self.held]), []
         for level in range(1, _LEVELS + 1):
             share = level / _LEVELS * (1 + 1e-15)
-            off = self._off(_wider(x, share * W), _wider(self.cells.u, share * U + self.held))
-            parts.append(total(off, weights))
-        bent = np.max(np.mean(parts, axis=0), axis=0)
-        gain = off.max(axis=0)[:, loop.states :]  # |B(x, p) - B| on all of the tube
-        moved = total(gain, self._of_inputs(size)) + self._shaken(_wider(x, W))
-        sudden = np.zeros(loop.states)
+            x, u = _wider(self.cells.x, share * W), _wider(self.cells.u, share * U + self.held)
+            off = (
+                (self._run(self._slopes, x, u) - Interval.exact(nominal.reshape(-1, 1))).sanitised().magnitude
+            )
+            off = np.ascontiguousarray(off.T).reshape(-1, *nominal.shape)
+            parts.append(total(off[:, :, :z], weights))
+        bent, widest = np.max(np.mean(parts, axis=0), axis=0), off.max(axis=0)
+        blown = total(widest[:, z:], loop.gusts.each) if loop.sways else loop.gusts.weigh(widest[:, z:])
+        moved = total(widest[:, n:z], self._of_inputs(size)) + blown
+        sudden = np.zeros(n)
         if not loop.slow:
             sudden[list(loop.unknown)] = self._strangeness[0]
         return np.concatenate([bent + self.defect + sudden + moved, self.held + self._slope(W)])
-
-    def _off(self, x: Interval, u: Interval) -> Array:
-        """|F_z - (A, B)| on boxes: (N, n, n + m)."""
-        nominal = np.hstack([self.loop.A, self.loop.B])
-        off = _distance(self._run(self._slopes, x, u), nominal)
-        return np.ascontiguousarray(off.T).reshape(-1, *nominal.shape)
 
     def _of_inputs(self, size: Array) -> Array:
         """|h_j| by input: of components of eta, or of what is sudden; (m,)."""
@@ -136,13 +131,6 @@ class Remainders:
         found = np.zeros(self.loop.inputs)
         found[list(self.loop.matched)] = size[: len(self.loop.matched)]
         return found
-
-    def _shaken(self, tube: Interval) -> Array:
-        """sup |(E(x) - E) w|, (n,): by rows, against a length or against components."""
-        loop = self.loop
-        off = _distance(self._run(self._E, tube, self.cells.u), loop.E)
-        rows = np.max(off, axis=1).reshape(loop.E.shape)
-        return total(rows, loop.gusts.each) if loop.sways else loop.gusts.weigh(rows)
 
     def _slope(self, W: Array) -> Array:
         """sup |h_j(t, x* + e) - h_j(t, x*)|, (m,)."""
@@ -232,11 +220,6 @@ class Remainders:
 
     def _h_run(self, tape: Tape, x: Interval) -> Interval:
         return tape.run([*(x[:, i] for i in range(x.lo.shape[1])), self._timed.t], (len(x.lo),))
-
-
-def _distance(found: Interval, nominal: Array) -> Array:
-    """How far entries (K, N) can be from those of a matrix with K entries."""
-    return (found - Interval.exact(nominal.reshape(-1, 1))).sanitised().magnitude
 
 
 def _wider(x: Interval, by: Array) -> Interval:
