@@ -65,7 +65,7 @@ def proven(name: str) -> Result:
     loop = Loop(spec=spec, model=model, plan=plan_of(spec, model), knots=None, slow=True, A=A, B=B, E=E)
     own = Controller(np.zeros((0, 0)), np.zeros((0, len(A))), np.zeros((len(N), 0)), N)
     inequalities, stages = propose(Remainders(loop, 64), own)
-    checked = check(loop, own, stages, inequalities.recipe, inequalities)
+    checked = check(loop, own, stages, inequalities.recipe)
     assert checked.verdict is Verdict.CERTIFIED, checked.lacks
     return Result(
         verdict=checked.verdict,

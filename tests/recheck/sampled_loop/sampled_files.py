@@ -125,7 +125,7 @@ def _proven(text: str, gain: tuple, slow: bool) -> str:
     matrices = {"A": A.reshape(n, n), "B": B.reshape(n, m), "E": E.reshape(n, -1)}
     loop = Loop(spec=spec, model=model, plan=plan_of(spec, model), knots=None, slow=slow, **matrices)
     inequalities, stages = propose(Remainders(loop, 64), Controller.of(own))
-    found = check(loop, inequalities.controller, stages, inequalities.recipe, inequalities)
+    found = check(loop, inequalities.controller, stages, inequalities.recipe)
     data = canonical(spec)
     result = Result(
         verdict=found.verdict,
