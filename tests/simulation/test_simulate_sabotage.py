@@ -20,12 +20,17 @@ from tubecert.simulation.adaptive.setting import Choice, loop_of
 SEED = 0
 
 
-def gains(own):
+def gains(own, part=10):
     """They are a tenth of those that are certified."""
     loop = loop_of(own, "l1", Choice())
     honest = loop.problem.gains
-    less = {name: getattr(honest, name) / 10 for name in ("bandwidth", "adaptation_rate")}
+    less = {name: getattr(honest, name) / part for name in ("bandwidth", "adaptation_rate")}
     return own, replace(loop, problem=replace(loop.problem, gains=replace(honest, **less)))
+
+
+def lower_gains(own):
+    """A hundredth: no loop of flat leaves the tube, with a thousandth it reaches .63 of it; a tenth breaks nothing."""
+    return gains(own, 100)
 
 
 def uncertainty(own):
@@ -48,7 +53,12 @@ def metric(own):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "lie", "bound"),
-    [("two_state", gains, "tube"), ("flat", uncertainty, "xtilde"), ("flat", metric, "D(t)")],
+    [
+        ("two_state", gains, "tube"),
+        ("flat", lower_gains, "xtilde"),
+        ("flat", uncertainty, "xtilde"),
+        ("flat", metric, "D(t)"),
+    ],
 )
 def test_a_lie_is_found_with_seed_run_and_time(name, lie, bound):
     own, loop = lie(setting(name))
