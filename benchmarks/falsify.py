@@ -45,7 +45,7 @@ def _setting(name: str) -> Setting:
 
 
 def _far_below(setting: Setting) -> Loop:
-    proven = setting.certified.proven(DISTANCE)
+    proven = setting.proven(DISTANCE)
     assert proven is not None
     omega, Gamma = FAR_BELOW
     choice = Choice(bandwidth=proven.bandwidth * omega, adaptation_rate=proven.adaptation_rate * Gamma)

@@ -286,12 +286,12 @@ def test_a_metric_of_its_own(files):
 def with_upper(own, share):
     """The setting of a tube over which M varies by this share."""
     lower = (own.reach / own.rho) ** 2
-    return replace(own, certified=replace(own.certified, upper=lower * (1 + share)))
+    return replace(own, upper=lower * (1 + share))
 
 
 def test_geodesics_are_cubic_where_the_metric_hardly_varies_over_the_tube():
     own = setting("flat")
     degrees = [loop_of(with_upper(own, share), "ccm", Choice()).problem.degree for share in (0.009, 0.011)]
     assert degrees == [3, 5]
-    unknown = replace(own, certified=replace(own.certified, upper=None))
+    unknown = replace(own, upper=None)
     assert loop_of(unknown, "ccm", Choice()).problem.degree == 5

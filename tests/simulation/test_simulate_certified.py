@@ -122,8 +122,8 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
 
 def test_without_certified_gains_the_options_are_named():
     where = setting("flat")
-    result = replace(where.certified.result, sections={}, decided_by=())
-    bare = replace(where, certified=replace(where.certified, result=result))
+    result = replace(where.result, sections={}, decided_by=())
+    bare = replace(where, result=result)
     error, finding = refused(loop_of, bare, "l1", Choice())
     assert error.exit_code is ExitCode.INVALID
     assert "--bandwidth and --adaptation-rate" in finding.help
@@ -164,7 +164,7 @@ def test_kinds_are_named_alike_everywhere():
 def test_a_loop_takes_the_gains_of_the_kind_that_is_asked_for(controller, wanted):
     where = setting("two_state", "0.4")
     loop = loop_of(where, controller, Choice(source=wanted))
-    recipe = where.certified.result.proof.of[name_of(wanted).key]
+    recipe = where.result.proof.of[name_of(wanted).key]
     assert loop.problem.gains.bandwidth == float(recipe.bandwidth)
     assert loop.gains_are == f"certified by {name_of(wanted)}"
     assert (loop.promise is None) == (controller == "reference")
@@ -216,7 +216,7 @@ def test_half_widths_keep_their_states_through_a_file(tmp_path):
     read = read_file(written(tmp_path, result)).result
     assert list(read.tube.half_widths) == ["p", "v"]
     for found in (result, read):
-        widths = setting_of(spec, found).half_widths
+        widths = setting_of(spec, found).box
         assert widths.tolist() == [result.tube.half_widths[name] for name in ("v", "p")]
         assert widths[0] > 1.02 * widths[1]
 

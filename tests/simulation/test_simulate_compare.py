@@ -35,7 +35,7 @@ def quiet_runs(share=0.5, *, lanes=2, of_distance=None, sign=1, **changes):
 
 def promised(**changes):
     """What is certified of the loop, with some of it replaced."""
-    return replace(promise(setting("flat").certified, DISTANCE), **changes)
+    return replace(promise(setting("flat"), DISTANCE), **changes)
 
 
 def broken(found):
@@ -61,7 +61,7 @@ def test_decay_solves_its_differential_equation(bandwidth, off):
 def test_the_error_of_the_estimate_counts_from_the_start():
     """(2.15) of what is certified, against its differential equation: a true loop broke a D(t) whose e came slowly."""
     where = setting("flat")
-    own, recipe = where.certified, where.certified.proven(DISTANCE)
+    own, recipe = where, where.proven(DISTANCE)
     rest, omega, e = map(float, (recipe.uncertainty, recipe.bandwidth, recipe.prediction_error))
 
     def right(t, D):

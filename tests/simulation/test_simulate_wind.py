@@ -85,7 +85,7 @@ def test_a_wind_blows_on_the_loop_of_b_and_breaks_nothing():
     text = FLAT + "disturbance: {E: [[1, 0], [0, 1]], bound: 1/100}\n"
     setting = setting_of(load_text(text), proven.result(text, bare=True, conditions="all"))
     own = loop_of(setting, "l1", Choice())
-    assert own.promise.decay.defect > 0.009 * setting.certified["wind_push"] > 0  # the plan has none
+    assert own.promise.decay.defect > 0.009 * setting["wind_push"] > 0  # the plan has none
     (found,) = simulate(setting, [own], count=15, seed=2).attacks
     assert found.adversary.comparison.worst["distance"].share > 0.1
     for comparison in (found.random.comparison, found.adversary.comparison):

@@ -43,7 +43,7 @@ def _states(campaign: Campaign) -> Figure:
     promises = [item.loop.promise for item in campaign.loops if item.loop.promise is not None]
     ultimate = min((own.ultimate for own in promises if own.ultimate is not None), default=None)
     plain = np.array_equal(setting.S, np.eye(len(names)))
-    for i, (axis, name, width) in enumerate(zip(axes, names, setting.half_widths, strict=True)):
+    for i, (axis, name, width) in enumerate(zip(axes, names, setting.box, strict=True)):
         plan, curves = first.x_plan[:, i], [item.runs.x[0, :, i] for item in campaign.loops]
         axis.fill_between(first.t, plan - width, plan + width, color=TUBE, alpha=0.25, lw=0, label="tube")
         # |x_i - x_i*| <= sup sqrt(W_ii) d, as the half-widths, where they are what bounds the tube
@@ -222,6 +222,6 @@ def _section(setting: Setting, i: int, j: int) -> Array:
     if all(e.is_constant for row in W for e in row):
         values = Tape([W[a][b] for a in (i, j) for b in (i, j)], ()).run_floats([], ()).reshape(2, 2)
         return np.asarray(setting.reach * circle @ np.linalg.cholesky(values).T)
-    widths = setting.half_widths[[i, j]]
+    widths = setting.box[[i, j]]
     spread = np.linalg.inv(setting.S.T @ setting.S)[np.ix_([i, j], [i, j])]
     return np.clip(setting.rho * circle @ np.linalg.cholesky(spread).T, -widths, widths)

@@ -90,7 +90,7 @@ class Geodesics:
             m = self._M @ span
             status = np.zeros(q.shape[1], dtype=np.int64)
             return Geodesic(status, np.einsum("in,in->n", span, m), m, m, self.a)
-        found = self._quick(p, span)
+        found = self._descended(p, span, self.a, newton=False)
         self._calls += 1
         if self._calls % _WATCHED == 1:
             straight = self._expand(p, span, np.zeros_like(self.a)).energy
@@ -103,51 +103,41 @@ class Geodesics:
         self.a = found.a
         return found
 
-    def _quick(self, p: Array, span: Array) -> Geodesic:
-        """With the Hessian of a constant metric."""
-        found, lanes, a = None, np.arange(span.shape[1]), self.a
-        for _ in range(_QUICK):
+    def _newton(self, p: Array, span: Array, before: Array) -> Geodesic:
+        """By Newton's method, from the segment or the curve before, whichever is shorter."""
+        straight, warm = (self._expand(p, span, a).energy for a in (np.zeros_like(before), before))
+        found = self._descended(p, span, np.where(warm <= straight, before, 0.0), newton=True)
+        found.status[~np.isfinite(straight)] = NOT_POSITIVE
+        for part in found[1:]:
+            part[..., found.status != FOUND] = 0.0
+        return found
+
+    def _descended(self, p: Array, span: Array, a: Array, newton: bool) -> Geodesic:
+        """Steps until the energy falls no more: with the Hessian of a constant metric, or its own and line search."""
+        found, lanes, share = None, np.arange(span.shape[1]), np.ones(1)
+        for _ in range(_MOST if newton else _QUICK):
             curve = self._expand(p, span, a)
-            step = np.einsum(
-                "kl,iln->ikn", self._softness, np.einsum("ijn,jkn->ikn", curve.W, curve.gradient)
-            )
-            gain = np.einsum("ikn,ikn->n", curve.gradient, step)
-            a = a - step
-            done = (gain <= _LAST * curve.energy) & np.isfinite(curve.energy)
-            if found is None:
-                found = _settled(curve, a)  # mostly of all lanes
+            if newton:
+                step = self._newton_step(p, span, a, curve.gradient)
+                share = self._share(p, span, (a, step, curve.energy))
+            else:
+                pulled = np.einsum("ijn,jkn->ikn", curve.W, curve.gradient)
+                step = np.einsum("kl,iln->ikn", self._softness, pulled)
+            gain, finite = np.einsum("ikn,ikn->n", curve.gradient, step), np.isfinite(curve.energy)
+            a = a - share * step
+            done = (gain <= _LAST * curve.energy) & finite & (share == 1)
+            own = _settled(curve, a)
+            if found is None:  # mostly of all lanes
+                found = own
                 found.status[~done] = NOT_FOUND
             else:
-                _settle(found, lanes, done, _settled(curve, a))
-            left = ~done & np.isfinite(curve.energy)
+                for whole, part in zip(found, own, strict=True):
+                    whole[..., lanes[done]] = part[..., done]
+            left = ~done & finite & (share > 0)
             if not left.any():
                 break
             lanes, p, span, a = lanes[left], _some(p, left), span[:, left], a[:, :, left]
         assert found is not None
-        return found
-
-    def _newton(self, p: Array, span: Array, before: Array) -> Geodesic:
-        """With the Hessian itself and line search, from the segment or the curve before, whichever is shorter."""
-        n, _, N = before.shape
-        nothing = np.zeros((n, N))
-        found = Geodesic(np.full(N, NOT_FOUND), np.zeros(N), nothing, nothing.copy(), np.zeros_like(before))
-        straight, warm = (self._expand(p, span, a).energy for a in (np.zeros_like(before), before))
-        found.status[~np.isfinite(straight)] = NOT_POSITIVE
-        lanes = np.flatnonzero(np.isfinite(straight))
-        a = np.where(warm <= straight, before, 0.0)[:, :, lanes]
-        p, span = _some(p, lanes), span[:, lanes]
-        for _ in range(_MOST):
-            if not len(lanes):
-                break
-            curve = self._expand(p, span, a)
-            step = self._newton_step(p, span, a, curve.gradient)
-            gain = np.einsum("ikn,ikn->n", curve.gradient, step)
-            share = self._share(p, span, (a, step, curve.energy))
-            a = a - share * step
-            done = (gain <= _LAST * curve.energy) & (share == 1)
-            _settle(found, lanes, done, _settled(curve, a))
-            left = ~done & (share > 0)
-            lanes, p, span, a = lanes[left], _some(p, left), span[:, left], a[:, :, left]
         return found
 
     def _newton_step(self, p: Array, span: Array, a: Array, gradient: Array) -> Array:
@@ -210,12 +200,6 @@ def _settled(curve: _Curve, a: Array) -> Geodesic:
     """The lanes as if they were done; `a` is one step further, for the next time."""
     resolved = curve.uneven <= _UNEVEN * curve.energy
     return Geodesic(np.where(resolved, FOUND, UNRESOLVED), curve.energy, curve.m[:, 0], curve.m[:, -1], a)
-
-
-def _settle(found: Geodesic, lanes: NDArray[np.intp], done: NDArray[np.bool_], own: Geodesic) -> None:
-    """Keeps those of some lanes that are done."""
-    for whole, part in zip(found, own, strict=True):
-        whole[..., lanes[done]] = part[..., done]
 
 
 def _some(p: Array, lanes: NDArray[np.intp] | NDArray[np.bool_]) -> Array:

@@ -310,7 +310,7 @@ def of_tube(setting: Setting) -> tuple[Clearance, ...]:
             t=own.t,
             collides=own.verdict is Verdict.REFUTED,
         )
-        for number, own in enumerate(setting.certified.result.clearance)
+        for number, own in enumerate(setting.result.clearance)
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Final
 
@@ -38,15 +38,15 @@ _EVEN, _EVEN_DEGREE = 1.01, 3  # where M varies by a factor of less over the tub
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Setting:
-    """Everything that the loops share: `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0.
+class Setting(Certified):
+    """Everything that the loops share, beside what is certified.
 
-    `spread` (n,): how far from x0 they may be, state by state. `E` (n, k) is that of the wind, `rest` (n, 1) what
-    unknown parameters do that no input can. `uncertainty` is the class of what may act.
+    `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0; `spread` (n,): how far from x0 they may be,
+    state by state. `E` (n, k) is that of the wind, `rest` (n, 1) what unknown parameters do that no input can.
+    `uncertainty` is the class of what may act.
     """
 
     spec: Spec
-    certified: Certified
     model: ControlAffineModel
     plan: Plan
     horizon: float
@@ -79,24 +79,9 @@ class Setting:
         return replace(self, plan=plan, x0=start, centre=start)
 
     @property
-    def rho(self) -> float:
-        """The radius of the tube, in z."""
-        return self.certified.rho
-
-    @property
-    def S(self) -> Array:
-        """The coordinates z = S x of the tube, (n, n)."""
-        return self.certified.S
-
-    @property
     def greatest_radius(self) -> float:
         """|x - x*| is at most this where |S (x - x*)| <= rho."""
         return self.rho * float(np.linalg.norm(np.linalg.inv(self.S), 2))
-
-    @property
-    def reach(self) -> float:
-        """dbar = sqrt(a) rho."""
-        return self.certified.reach
 
     @property
     def tolerance(self) -> float:
@@ -104,9 +89,9 @@ class Setting:
         return _TOLERANCE * self.rho
 
     @property
-    def half_widths(self) -> Array:
+    def box(self) -> Array:
         """Bounds of |x_i - x_i*| in the tube, (n,)."""
-        return np.array([self.certified.half_widths[name] for name in self.spec.states])
+        return np.array([self.half_widths[name] for name in self.spec.states])
 
 
 def setting_of(
@@ -120,10 +105,10 @@ def setting_of(
     single = certified_plan(spec, model, result) if plan is None else plan
     horizon = horizon_of(spec, duration)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
-    centre, fields = _start_of(single), Fields(model, _coordinates(result))
+    centre, field = _start_of(single), Fields(model, _coordinates(result))
     return Setting(
+        **{item.name: getattr(certified, item.name) for item in fields(Certified)},
         spec=spec,
-        certified=certified,
         model=model,
         plan=single,
         horizon=horizon,
@@ -133,8 +118,8 @@ def setting_of(
         within=0.0 if spec.within is None else float(spec.within),
         spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
         uncertainty=class_of(certified, len(spec.states), len(spec.inputs), _sources(certified, model)),
-        E=_wind(model, fields),
-        rest=_rest(model, fields),
+        E=_wind(model, field),
+        rest=_rest(model, field),
         h=None if wanted is None else tuple(term.expression for term in wanted),
         layer=_LAYER * certified["metric_input_gain"] * certified.reach,
     )
@@ -247,7 +232,7 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
         message = "parameters known by ranges stand in B, and the loops are stated for a known B"
         help = "give each of them one value: --set system.parameters.NAME=VALUE"
         raise TubecertError([Finding(code="TC705", message=message, location=where, help=help)])
-    kind, own = name_of(choice.source), setting.certified
+    kind = name_of(choice.source)
     problem = LoopProblem(
         model=setting.model,
         plan=setting.plan,
@@ -255,8 +240,8 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
         horizon=setting.horizon,
         times=setting.times,
         limit=_LIMIT * setting.greatest_radius,
-        degree=_EVEN_DEGREE if _even(own) else _DEGREE,
-        P=own.S.T @ own.S,
+        degree=_EVEN_DEGREE if _even(setting) else _DEGREE,
+        P=setting.S.T @ setting.S,
         E=setting.E,
         rest=setting.rest,
     )
@@ -264,7 +249,7 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
     return Loop(
         problem=replace(problem, gains=gains),
         gains_are="no adaptation" if gains is None else f"certified by {kind}" if covered else CHOSEN,
-        promise=promise(own, kind) if covered and problem.adapts else None,
+        promise=promise(setting, kind) if covered and problem.adapts else None,
     )
 
 
@@ -276,7 +261,7 @@ def _even(own: Certified) -> bool:
 def _gains(setting: Setting, problem: LoopProblem, choice: Choice) -> tuple[LoopGains, bool]:
     """The gains of a loop that filters, and whether they are those that a certificate proves."""
     adapts, kind = problem.adapts, name_of(choice.source)
-    proven, smooth = setting.certified.proven(kind), setting.spec.adaptation.smooth
+    proven, smooth = setting.proven(kind), setting.spec.adaptation.smooth
     bandwidth = choice.bandwidth or (None if proven is None else proven.bandwidth)
     rate = choice.adaptation_rate or (None if proven is None else proven.adaptation_rate)
     if bandwidth is None or (adapts and rate is None):
