@@ -209,6 +209,19 @@ def test_who_interrupts_the_drawing_has_runs_and_summary_and_no_earlier_figures(
     assert names == {"runs.npz", "states.png", "summary.json"}
 
 
+@pytest.mark.slow
+def test_who_interrupts_while_data_are_compressed_has_them(files, monkeypatch):
+    """They were lost: to compress takes longer than to store them as they are."""
+
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez_compressed", interrupted)
+    assert command("--runs", "3", "--controllers", "l1").exit_code == 0
+    with np.load(files / "flat.simulation" / "runs.npz") as data:
+        assert data["l1_sample_largest_distance"].shape == (3,)
+
+
 def test_a_folder_that_stays_empty_does_not_stay(files):
     assert command("--certificate", "none.json", "-o", "new").exit_code == 2
     assert not (files / "new").exists()

@@ -1,7 +1,6 @@
 """Runs as lanes of one vector, from start to end: Runge-Kutta steps of any system, and what is seen of every lane.
 
-Arrays have the lanes last. The stages are those of the classical method; what a system does beside its slopes, such as
-an exact flow within the step, it adds to them (`System`).
+Arrays have the lanes last. The stages are those of the classical method (`System`).
 """
 
 from __future__ import annotations
@@ -29,9 +28,12 @@ class Steps(NamedTuple):
 
 
 class System(Protocol):
-    """What N lanes do in some steps.
+    """What N lanes do in some `steps`: all that the loops in continuous time and the sampled ones have to say.
 
-    `stopped` (N,) is 0 for the lanes that go on; the others may have any values. Above 0 it is why they failed.
+    A step calls `at` four times, for the slopes at its stages, and after the first of them `instant`; then `step`, for
+    what goes on beside the slopes, such as an exact flow. Peaks are taken of the `sizes` of what `instant` saw, and what
+    is `kept` of it stays at the output times. `stopped` (N,) is 0 for the lanes that go on; the others may have any
+    values. Above 0 it is why they failed.
     """
 
     steps: Steps
@@ -48,10 +50,10 @@ class System(Protocol):
         """The slope (n, N) at a stage, to which the slope of the stage before leads from the start of the step."""
 
     def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
-        """What is seen of the lanes at the start of a step, (.., N), after its first stage; `u` (m, N) the inputs."""
+        """What is seen of the lanes at the start of a step, by name, (.., N); `u` (m, N) are the inputs."""
 
     def step(self, step: int) -> Array | float:
-        """Goes to the end of a step, after its last stage; what that adds to x."""
+        """Goes to the end of a step; what that adds to x."""
 
     def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
         """What peaks are taken of, (S, N), from what was seen at S instants, (S, .., N)."""

@@ -69,7 +69,7 @@ def _plane(campaign: Campaign) -> Figure | None:
     t = np.linspace(0.0, setting.horizon, 2001)
     plan = setting.plan.enclose(t, t)[0].mid[:, [i, j]]
     section = _section(setting, i, j)
-    shapes = [section + point for point in _spread(plan)]
+    shapes = [section + point for point in plan[:: -(-len(plan) // _SHAPES)]]
     figure, axis = plane_of(setting.spec, names, shapes, plan)
     for item in campaign.loops:
         _draw(axis, item.loop, item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4)
@@ -199,15 +199,6 @@ def _window(tube: Array, curves: list[Array], room: float) -> tuple[float, float
     )
     margin = 0.05 * np.ptp(shown)
     return float(shown.min() - margin), float(shown.max() + margin)
-
-
-def _spread(curve: Array) -> Array:
-    """Points (K, 2) of a curve at equal distances along it."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-    if length[-1] == 0:
-        return curve[:1]
-    wanted = np.linspace(0.0, length[-1], _SHAPES)
-    return np.stack([np.interp(wanted, length, curve[:, i]) for i in range(2)], axis=1)
 
 
 def _section(setting: Setting, i: int, j: int) -> Array:

@@ -32,6 +32,7 @@ _USABLE: Final = 1e-2  # of rho: a run with a larger error estimate is no result
 _EXACT: Final = 1e-6  # what rounding may add to a bound that is met with equality
 _SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "speed")
 _LISTED: Final = 20  # of the runs that left, stopped or came to nothing
+_MEETS: Final = Verdict.REFUTED
 _POINTS: Final = 2001  # of a curve, whose distances from obstacles are taken
 
 
@@ -105,7 +106,6 @@ class Comparison:
     worst: Mapping[str, Use]
     violations: tuple[Violation, ...]
     settled: float | None
-    final_deviation: float | None
     error_estimate: float
     inputs: tuple[InputUse, ...] = ()
 
@@ -126,45 +126,37 @@ class _Judged(NamedTuple):
 
 
 def compare(setting: Setting, runs: Runs, promise: Promise | None, first: int = 0) -> Comparison:
-    """The comparison of runs, numbered from `first` on, with the tube, and with a promise if there is one."""
-    own = _judged(setting, runs, first)
+    """The comparison of runs, numbered from `first` on, with the tube, and with a promise if there is one.
+
+    A run that was stopped has left the tube if it was far outside: its error estimate is void, its exit is not.
+    """
+    peak, usable = runs.found.peak, runs.error <= _USABLE * setting.rho
+    room = _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
+    left = usable & (peak["deviation"] > setting.rho * (1 + room))
+    left |= usable & (peak["distance"] > setting.reach * (1 + room))
+    left |= (runs.found.stopped != 0) & (peak["deviation"] > 2 * setting.rho)
+    deviation = np.linalg.norm(runs.off @ setting.S.T, axis=2)
+    own = _Judged(setting, runs, usable, left, room, deviation, first)
     bounds = promise.bounds if promise else {"distance": setting.reach, "deviation": setting.rho}
-    outside, void = np.flatnonzero(own.left), ~own.usable & ~own.left
-    stopped = {item.lane for item in runs.failures}
+    outside, void, any_usable = np.flatnonzero(left), ~usable & ~left, bool(usable.any())
+    unknown = np.flatnonzero(void & (runs.found.stopped == 0))[:_LISTED].tolist()
     return Comparison(
         runs=runs.lanes,
         left_the_tube=len(outside),
         first_outside=tuple((first + outside[:_LISTED]).tolist()),
         first_exit=_first_exit(own),
         no_result=int(void.sum()),
-        unresolved=tuple(
-            RunAt(run=first + int(lane), t=_finite(runs.unresolved[lane]))
-            for lane in np.flatnonzero(void)
-            if lane not in stopped
-        )[:_LISTED],
+        unresolved=tuple(RunAt(run=first + lane, t=_finite(runs.unresolved[lane])) for lane in unknown),
         stopped=tuple(
             Stopped(run=first + item.lane, t=_finite(item.t), reason=item.reason)
             for item in runs.failures[:_LISTED]
         ),
-        worst={name: _use(own, name, bounds.get(name)) for name in _SHOWN} if own.usable.any() else {},
+        worst={name: _use(own, name, bounds.get(name)) for name in _SHOWN} if any_usable else {},
         violations=tuple(_violations(own, promise)) if promise else (),
         settled=_settled(own, promise.ultimate if promise else None),
-        final_deviation=float(np.max(own.deviation[own.usable, -1])) if own.usable.any() else None,
-        error_estimate=float(np.max(runs.error[own.usable], initial=0.0)),
-        inputs=tuple(_inputs(own, promise)) if own.usable.any() else (),
+        error_estimate=float(np.max(runs.error[usable], initial=0.0)),
+        inputs=tuple(_inputs(own, promise)) if any_usable else (),
     )
-
-
-def _judged(setting: Setting, runs: Runs, first: int) -> _Judged:
-    """A run that was stopped has left the tube if it was far outside: its error estimate is void, its exit is not."""
-    usable = runs.error <= _USABLE * setting.rho
-    room = _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
-    peak = runs.found.peak
-    left = usable & (peak["deviation"] > setting.rho * (1 + room))
-    left |= usable & (peak["distance"] > setting.reach * (1 + room))
-    left |= (runs.found.stopped != 0) & (peak["deviation"] > 2 * setting.rho)
-    deviation = np.linalg.norm(runs.off @ setting.S.T, axis=2)
-    return _Judged(setting, runs, usable, left, room, deviation, first)
 
 
 def _use(own: _Judged, name: str, bound: float | None) -> Use:
@@ -247,13 +239,13 @@ def _broken(
     excess = np.where(own.usable, values - bounds - own.room * scale, -np.inf)
     lane = int(np.argmax(excess))
     if excess[lane] > 0:
-        yield Violation(
-            bound_of=name,
-            run=own.first + lane,
-            t=_finite(times[lane]),
-            value=float(values[lane]),
-            bound=float(bounds[lane]),
+        run, t, value, bound = (
+            own.first + lane,
+            _finite(times[lane]),
+            float(values[lane]),
+            float(bounds[lane]),
         )
+        yield Violation(bound_of=name, run=run, t=t, value=value, bound=bound)
 
 
 def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: str) -> None:
@@ -270,13 +262,9 @@ def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: 
     with np.errstate(invalid="ignore"):
         h_x = np.linalg.norm(np.nan_to_num(slopes @ np.linalg.inv(setting.S)), ord=2, axis=(2, 3))
         size, h_t = np.linalg.norm(values[:2], axis=1)
-    sizes = (
-        ("|h|", size, kind.h, "h"),
-        ("|dh/dt|", h_t, kind.h_t, "h_t"),
-        ("|dh/dx|", h_x, kind.h_x, "h_x"),
-        ("|h| at the start", np.where(runs.t == 0, size, 0.0), kind.h_initial, "h"),
-    )
-    for words, found, bound, declared in sizes:
+    begun = "|h| at the start", np.where(runs.t == 0, size, 0.0), kind.h_initial, "h"
+    rates = ("|dh/dt|", h_t, kind.h_t, "h_t"), ("|dh/dx|", h_x, kind.h_x, "h_x")
+    for words, found, bound, declared in (("|h|", size, kind.h, "h"), *rates, begun):
         excess = np.where(inside, np.nan_to_num(found), 0.0)
         lane, step = np.unravel_index(int(np.argmax(excess)), excess.shape)
         if excess[lane, step] > bound * (1 + _EXACT):
@@ -303,14 +291,10 @@ class Clearance:
 
 def of_tube(setting: Setting) -> tuple[Clearance, ...]:
     """That of the tube over the whole plan: what is proven, in the certificate."""
+    found = enumerate(setting.result.clearance)
     return tuple(
-        Clearance(
-            obstacle=number,
-            clearance=_finite(own.clearance.below),
-            t=own.t,
-            collides=own.verdict is Verdict.REFUTED,
-        )
-        for number, own in enumerate(setting.result.clearance)
+        Clearance(obstacle=i, clearance=_finite(own.clearance.below), t=own.t, collides=own.verdict is _MEETS)
+        for i, own in found
     )
 
 
