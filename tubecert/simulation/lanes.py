@@ -31,8 +31,8 @@ class System(Protocol):
     """What N lanes do in some `steps`: all that the loops in continuous time and the sampled ones have to say.
 
     A step calls `at` four times, for the slopes at its stages, and after the first of them `instant`; then `step`, for
-    what goes on beside the slopes, such as an exact flow. Peaks are taken of the `sizes` of what `instant` saw, and what
-    is `kept` of it stays at the output times. `stopped` (N,) is 0 for the lanes that go on; the others may have any
+    what goes on beside the slopes, such as an exact flow. Peaks are taken of the `sizes` of what `instant` saw, and of
+    that what is `kept` stays at the output times. `stopped` (N,) is 0 for the lanes that go on; the others may have any
     values. Above 0 it is why they failed.
     """
 
