@@ -424,7 +424,7 @@ def test_what_is_affine_needs_no_search(f):
     whole = start._over_rest([moved])
     assert whole is not None
     assert len(set(whole.variables) - {"t"}) < 3
-    found, exact = start.norms("f", [moved]), start._over_tube("f", whole)
+    found, exact = start.norms("f", [moved]), start.over_tube("f", whole)
     tube = Tube(start.plan, start.section, states=NAMES, inputs=(), time=start.time)
     boxes = supremum(SumOfNorms([moved]), tube, start.effort)
     assert max(found.below, boxes.below) <= min(found.above, boxes.above)

@@ -51,6 +51,7 @@ OF_A_MACHINE = ("hardware.", "trajectory.afterwards", "trajectory.input_rate")
 OF_FILES = {
     "system.definitions.*": "system.f",
     "system.tables.*.file": "system.tables.*.points",
+    "trajectory.near": "trajectory.at",
     "trajectory.columns.*": "trajectory.knots",
     "trajectory.columns.*.name": "trajectory.knots",
     "trajectory.columns.*.scale": "trajectory.knots",

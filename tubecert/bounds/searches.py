@@ -83,17 +83,14 @@ class Searches:
             return np.full(len(self.model.states), self.rho)
         return self.rho * np.sqrt([float(row[i]) for i, row in enumerate(self.coordinates.spread)])
 
-    def over_tube(self, name: str, objective: Objective, effort: Effort) -> Supremum:
-        """A supremum over the tube, with an effort of its own."""
-        return self._over_tube(name, objective, effort)
-
-    def _over_tube(
+    def over_tube(
         self,
         name: str,
         objective: Objective,
         effort: Effort | None = None,
         extra: dict[str, Range] | None = None,
     ) -> Supremum:
+        """A supremum over the tube, with an effort of its own or that for the constant."""
         return self._run(name, objective, self.tube(extra or {}), effort or self.effort_for(name))
 
     def tube(self, extra: Mapping[str, Range]) -> Tube:

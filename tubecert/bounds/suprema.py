@@ -52,8 +52,8 @@ class Suprema(Searches):
         """(a, A): inf lmin(M) = 1/sup lmax(W) and sup lmax(M), with M = W^-1, (1.1)."""
         fine = self._fine
         unit = self._unit
-        largest = self._over_tube("lower", Pencil(self.model.W, unit), fine)
-        upper = self._over_tube("upper", Pencil(unit, self.model.W), fine)
+        largest = self.over_tube("lower", Pencil(self.model.W, unit), fine)
+        upper = self.over_tube("upper", Pencil(unit, self.model.W), fine)
         inverse = (Interval.exact(1.0) / Interval(largest.below, largest.above)).sanitised()
         lower = Constant(below=float(inverse.lo), above=float(inverse.hi), at=self._witness(largest))
         return lower, self._constant(upper)
@@ -68,7 +68,7 @@ class Suprema(Searches):
     def greatest_stretch(self) -> Constant:
         """sup sqrt(lmax(M)) with M in x: the metric length of a vector over its length in x, theory 1a.3."""
         return self._root(
-            self._over_tube("upper", Pencil(identity(len(self.model.states)), self.model.W), self._fine)
+            self.over_tube("upper", Pencil(identity(len(self.model.states)), self.model.W), self._fine)
         )
 
     @property
@@ -82,7 +82,7 @@ class Suprema(Searches):
         slopes = [w for w in self.fields.W_x if any(e is not ZERO for row in w for e in row)]
         if not slopes:
             return Constant.exactly(0.0)
-        return self._constant(self._over_tube("M_x", SumOfPencils(slopes, multiply(W, W))))
+        return self._constant(self.over_tube("M_x", SumOfPencils(slopes, multiply(W, W))))
 
     # -- dynamics ----------------------------------------------------------------------------------------------
 
@@ -102,7 +102,7 @@ class Suprema(Searches):
 
         recheck proves such a norm by boxes in all states: to be sharper than was asked for would cost it minutes.
         """
-        found = self._over_tube(name, objective, effort)
+        found = self.over_tube(name, objective, effort)
         if not isinstance(objective, NormOverRest):
             return found
         known = set(objective.variables) <= set(found.at)  # or no point was found
@@ -174,7 +174,7 @@ class Suprema(Searches):
         """A Lipschitz constant of entries in the states, whatever their kinks."""
         if not free_symbols(entries) & set(self.model.states):
             return Constant.exactly(0.0)
-        return self._constant(self._over_tube("h_x", lipschitz_constant(entries, fields or self.fields)))
+        return self._constant(self.over_tube("h_x", lipschitz_constant(entries, fields or self.fields)))
 
     def uncertainty(self, fields: Fields | None = None) -> tuple[Constant, Constant, Constant]:
         """(Dh, Dhx, Dht) of the h given as expressions; Dhx is a Lipschitz constant where h has kinks, (2.3).
@@ -200,9 +200,9 @@ class Suprema(Searches):
 
         Exact: 2 |B~ v| |v| = min over mu of |B~ v|^2/mu + mu |v|^2, attained at some mu <= smax(B~).
         """
-        top = self._over_tube("feedback_gain", Pencil(self.model.BBt, self.model.W))
+        top = self.over_tube("feedback_gain", Pencil(self.model.BBt, self.model.W))
         largest = float(np.nextafter(np.sqrt(top.above), np.inf))  # a root is rounded to nearest (IEEE 754)
-        found = self._over_tube("feedback_gain", exact_gain(self.model, largest), extra={MU: (0.0, largest)})
+        found = self.over_tube("feedback_gain", exact_gain(self.model, largest), extra={MU: (0.0, largest)})
         above = found.above
         if self.model.constant_input:
             effort = self.effort_for("feedback_gain")
@@ -212,7 +212,7 @@ class Suprema(Searches):
 
     def feedback_gain_closed_form(self, effort: Effort | None = None) -> float:
         """A bound of du in closed form: looser, but it needs no search over mu, theory 2.2."""
-        return self._over_tube("feedback_gain", ClosedFormGain(self.model), effort).above
+        return self.over_tube("feedback_gain", ClosedFormGain(self.model), effort).above
 
     # -- on the plan -------------------------------------------------------------------------------------------
 
@@ -269,13 +269,7 @@ class Suprema(Searches):
 
     def _width(self, name: str, square: Expression) -> Constant:
         effort = None if self.coordinates is None else self._fine  # it is no part of a ball
-        return self._root(self._over_tube(f"half width of {name}", Pencil([[square]], [[ONE]]), effort))
-
-    def widths(self) -> dict[str, Constant]:
-        """What a length in the metric is at most in every state and output, by name."""
-        states = zip(self.model.states, self.half_widths(), strict=True)
-        outputs = zip(self.model.outputs, self.output_widths(), strict=True)
-        return dict(states) | {output.name: width for output, width in outputs}
+        return self._root(self.over_tube(f"half width of {name}", Pencil([[square]], [[ONE]]), effort))
 
     def shape_in(self, first: int, second: int) -> Shape:
         """Bounds over the tube of the block of W that belongs to two states, theory 4c."""
@@ -283,7 +277,7 @@ class Suprema(Searches):
         def most(entry: Expression) -> float:
             if entry.is_constant:
                 return fraction_bounds(entry.fraction)[1]
-            return self._over_tube("shape in the plane", Pencil([[entry]], [[ONE]])).above
+            return self.over_tube("shape in the plane", Pencil([[entry]], [[ONE]])).above
 
         W = self.model.W
         return Shape(  # what is printed is what is used
@@ -295,4 +289,4 @@ class Suprema(Searches):
 
     def root_of(self, name: str, objective: Objective) -> Constant:
         """The root of a supremum over the tube."""
-        return self._root(self._over_tube(name, objective))
+        return self._root(self.over_tube(name, objective))

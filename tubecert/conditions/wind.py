@@ -27,11 +27,6 @@ def _sum(first: T | None, second: T | None) -> T | None:
     return first + second
 
 
-def beside(n: Numbers[T]) -> T | None:
-    """|E w + r|: what moves the state and is no input; None without wind and unknown parameters, zeta of theory 7.5."""
-    return _sum(n.wind_speed, n.rest_speed)
-
-
 def taken(n: Numbers[T]) -> T:
     """What is taken for a part of h at least: eps_w |w| of (7.9)."""
     return number(0, n.d0) if n.wind_error is None else n.wind_error

@@ -220,38 +220,6 @@ class MatrixFunction:
             signs[v, expanded], signs[v, corners] = flip, choice
         return Expansion(mids, rads, sizes, rests, signs)
 
-    def linear(self, lo: Array, hi: Array) -> list[tuple[Array, Array]]:
-        """For each matrix its value at the centre and its change to the right end by variable, (1 + d, N, p, q), and a
-        radius (N, p, q) for the rest: the mean value form, of a function of order 1; of order 0 the rest alone.
-        """
-        assert not self._affine
-        if not self._order:
-            found = []
-            for mid, rad in map(midrad, self.at(lo, hi)):
-                parts = np.zeros((1 + len(self.variables), *mid.shape))
-                parts[0] = mid
-                found.append((parts, rad))
-            return found
-        centre = np.clip(0.5 * lo + 0.5 * hi, lo, hi)
-        radius = np.maximum(np.nextafter(np.maximum(hi - centre, centre - lo), np.inf), _LEAST_RADIUS)
-        at = self._of(centre, lo, hi, self._fixed)
-        slopes, _ = self._derivatives(at, lo, hi, len(self._curved))
-        found = []
-        for k, value in enumerate(self._unpack(self._values.run(at), self.shapes)):
-            mid, rad = midrad(value)
-            parts = np.zeros((1 + len(self.variables), *mid.shape))
-            parts[0] = mid
-            for slope, v in zip(slopes, self._curved, strict=True):
-                i = self.variables.index(v)
-                r = radius[:, i][:, None, None]
-                slope_mid, slope_rad = midrad(slope[k])
-                parts[1 + i] = r * slope_mid
-                # a product is rounded once, by u of itself
-                rad = rad + r * (slope_rad + 4e-16 * np.abs(slope_mid))
-            # an addition for each variable (at most 80) and 2 roundings in each term: below 90 u <= 1e-14
-            found.append((parts, rad * (1 + 1e-14)))
-        return found
-
     def _derivatives(
         self, thin: Interval, box_lo: Array, box_hi: Array, curved: int
     ) -> tuple[list[list[Interval]], list[list[list[Interval]]]]:

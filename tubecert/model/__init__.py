@@ -5,8 +5,7 @@ expressions; what is undefined on the safe set, as findings; a decision about th
 
 | module | what it does |
 |---|---|
-| `affine` | f, B, W and what is made of them; the period of what depends on t |
-| `zeros` | that an expression has no zero on a box, or where one is |
+| `affine` | f, B, W and what is made of them; the period of what depends on t; zeros on a box |
 | `defined` | what the terms of a specification owe: that they are defined and smooth on the set and the horizon |
 | `rank` | whether B has full column rank on the safe set |
 """
