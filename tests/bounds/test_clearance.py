@@ -16,7 +16,7 @@ from tubecert.trajectory.plan import Plan, constant_plan
 
 EFFORT = Effort(gap=1e-2, absolute=0.0, budget=100_000)
 W = np.array([[1.0, 0.5], [0.5, 4.0]])
-SHAPE = Shape(first=1.0, second=4.0, low=0.5, high=0.5)
+SHAPE = Shape(diagonal=(1.0, 4.0), beside=(0.5, 0.5))
 
 
 def section(reach=0.1, shape=SHAPE):
@@ -122,7 +122,7 @@ def test_no_state_of_the_tube_is_nearer(x, y, r, reach, seed):
 
 
 def test_a_piece_of_w_beside_the_diagonal_counts_on_its_worse_side():
-    wide = Shape(first=1.0, second=4.0, low=-0.5, high=0.5)
+    wide = Shape(diagonal=(1.0, 4.0), beside=(-0.5, 0.5))
     for c in ((Fraction(3, 5), Fraction(4, 5)), (Fraction(3, 5), Fraction(-4, 5))):
         assert float(wide.square(c).hi) == pytest.approx(0.36 + 4 * 0.64 + 2 * 0.48 * 0.5, rel=1e-12)
 

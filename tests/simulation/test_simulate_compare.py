@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from simulated import FLAT, Failure, certified, runs, setting
 
-from tubecert.certificate.result import Bound, InputBoundData, Recipes
+from tubecert.certificate.result import Bound, Recipes
+from tubecert.conditions.inputs import InputBound
 from tubecert.errors import TubecertError
 from tubecert.letters import DISTANCE, RATES
 from tubecert.simulation.adaptive.judge import RunAt, check_class, compare
@@ -149,7 +150,7 @@ def test_every_other_bound_is_checked(name):
 
 @pytest.mark.parametrize(("least", "expected"), [(-0.9, set()), (-1.1, {"input -u"})])
 def test_inputs_stay_in_their_ranges(least, expected):
-    stays = InputBoundData(least=-1.0, greatest=2.0, feedback=0.0, adaptation=0.0)
+    stays = InputBound(least=-1.0, greatest=2.0, feedback=0.0, adaptation=0.0)
     own = promised(ranges={"u": stays}, decay=None)
     compared = compare(setting("flat"), quiet_runs(lanes=1, least=[[least]], greatest=[[1.0]]), own)
     assert broken(compared) == expected

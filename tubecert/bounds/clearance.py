@@ -45,20 +45,18 @@ def directions() -> tuple[Vector, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """Bounds over the tube of the block of W in the plane: W11 <= first, W22 <= second, W12 in [low, high]."""
+    """Bounds over the tube of the block of W in the plane: of W11 and W22, and [low, high] of W12."""
 
-    first: float
-    second: float
-    low: float
-    high: float
+    diagonal: tuple[float, float]
+    beside: tuple[float, float]
 
     def square(self, c: Vector) -> Interval:
         """An upper bound of sup c'Wc, as its upper end: s(c)^2/dbar^2 of theory 4c."""
         x, y = map(Interval.of, c)
-        turned = self.high if c[0] * c[1] > 0 else self.low
+        turned = self.beside[c[0] * c[1] > 0]
         total = (
-            x * x * Interval.exact(self.first)
-            + y * y * Interval.exact(self.second)
+            x * x * Interval.exact(self.diagonal[0])
+            + y * y * Interval.exact(self.diagonal[1])
             + 2 * x * y * Interval.exact(turned)
         )
         return Interval(np.zeros(()), np.maximum(total.hi, 0.0))

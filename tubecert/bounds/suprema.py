@@ -280,11 +280,10 @@ class Suprema(Searches):
             return self.over_tube("shape in the plane", Pencil([[entry]], [[ONE]])).above
 
         W = self.model.W
+        beside = W[first][second]
         return Shape(  # what is printed is what is used
-            first=printable_above(most(W[first][first])),
-            second=printable_above(most(W[second][second])),
-            low=printable_below(-most(-W[first][second])),
-            high=printable_above(most(W[first][second])),
+            diagonal=(printable_above(most(W[first][first])), printable_above(most(W[second][second]))),
+            beside=(printable_below(-most(-beside)), printable_above(most(beside))),
         )
 
     def root_of(self, name: str, objective: Objective) -> Constant:

@@ -9,7 +9,7 @@ of the file: every member of `overrides` is told with its value. So are other by
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -74,13 +74,8 @@ def compared(spec: Spec, result: Result) -> Belonging:
     differing = _differing(own, effective)
     if spec.trajectory.table is not None and "trajectory" not in differing:
         differing += _other_table(result.plan.knots, spec.trajectory.table)
-    return Belonging(
-        serious=tuple(key for key in differing if key not in _IDLE),
-        idle=tuple(key for key in differing if key in _IDLE),
-        overridden=tuple(_told(result.overrides)),
-        synthesised=asked is not None,
-        rewritten=tuple(_rewritten(spec, result)),
-    )
+    rewritten = _rewritten(spec, result)
+    return _belonging(differing, _told(result.overrides), rewritten, synthesised=asked is not None)
 
 
 def compared_canonically(
@@ -91,14 +86,28 @@ def compared_canonically(
     differing, table = _differing(canonical(own), effective), own.trajectory.table
     if table is not None and table.knots != knots:
         differing.append(f"the knots of {table.file}")
-    rewritten = _hash(hashlib.sha256(spec.source.encode()).hexdigest()) != file_hash
+    told = tuple(f"{visible(path)} = {visible(text)}" for path, text in sorted(settings.items()))
+    return _belonging(differing, told, ["the file"] if _hash_of(spec) != file_hash else [])
+
+
+def _belonging(
+    differing: Iterable[str],
+    overridden: Iterable[str],
+    rewritten: Iterable[str],
+    *,
+    synthesised: bool = False,
+) -> Belonging:
     return Belonging(
         serious=tuple(key for key in differing if key not in _IDLE),
         idle=tuple(key for key in differing if key in _IDLE),
-        overridden=tuple(f"{visible(path)} = {visible(text)}" for path, text in sorted(settings.items())),
-        synthesised=False,
-        rewritten=("the file",) if rewritten else (),
+        overridden=tuple(overridden),
+        synthesised=synthesised,
+        rewritten=tuple(rewritten),
     )
+
+
+def _hash_of(spec: Spec) -> str:
+    return f"sha256:{hashlib.sha256(spec.source.encode()).hexdigest()}"
 
 
 def _told(overrides: Overrides) -> Iterator[str]:
@@ -111,14 +120,10 @@ def _told(overrides: Overrides) -> Iterator[str]:
 def _rewritten(spec: Spec, result: Result) -> Iterator[str]:
     """Files whose bytes are others than the certificate names, though they say the same."""
     table = spec.trajectory.table
-    if _hash(hashlib.sha256(spec.source.encode()).hexdigest()) != result.spec.file_hash:
+    if _hash_of(spec) != result.spec.file_hash:
         yield "the file"
-    if table is not None and _hash(table.sha256) != result.plan.file_hash:
+    if table is not None and f"sha256:{table.sha256}" != result.plan.file_hash:
         yield table.file
-
-
-def _hash(digest: str) -> str:
-    return f"sha256:{digest}"
 
 
 def as_set(spec: Spec, settings: Mapping[str, str]) -> Spec:
@@ -156,14 +161,11 @@ def _spread(data: Mapping[str, Any]) -> dict[str, Any]:
 def _other_table(knots: KnotTexts | None, table: Table) -> list[str]:
     """What of a plan file differs: bytes that say the same knots are the same plan."""
     own = table.knots
-    if knots is not None and (own.t, own.x, own.u) == (_exact(knots.t), _rows(knots.x), _rows(knots.u)):
-        return []
-    return [f"the knots of {table.file}"]
 
+    def exact(texts: Sequence[str]) -> tuple[Fraction, ...]:
+        return tuple(from_json(Fraction, text, "knots") for text in texts)
 
-def _rows(rows: Sequence[Sequence[str]]) -> tuple[tuple[Fraction, ...], ...]:
-    return tuple(map(_exact, rows))
-
-
-def _exact(texts: Sequence[str]) -> tuple[Fraction, ...]:
-    return tuple(from_json(Fraction, text, "knots") for text in texts)
+    theirs = (
+        None if knots is None else (exact(knots.t), tuple(map(exact, knots.x)), tuple(map(exact, knots.u)))
+    )
+    return [] if (own.t, own.x, own.u) == theirs else [f"the knots of {table.file}"]

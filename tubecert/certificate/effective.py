@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from typing import Any, TypeVar
 
@@ -113,7 +113,9 @@ class ObstacleView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _View:
+class View:
+    """What readers need of a specification, typed."""
+
     name: str
     system: SystemView
     trajectory: TrajectoryView
@@ -124,24 +126,17 @@ class _View:
 
 
 for _kind in (
-    _View, SystemView, TableView, UncertaintyView, DisturbanceView, TrajectoryView, TubeView,
+    View, SystemView, TableView, UncertaintyView, DisturbanceView, TrajectoryView, TubeView,
     ObstacleView, DiscView,
 ):  # fmt: skip
     OPEN.add(_kind)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Effective:
+class Effective(View):
     """The effective specification: canonical data, itself a specification (`data`), and typed views of it."""
 
     data: Mapping[str, Tree] = field(repr=False)
-    name: str
-    system: SystemView
-    trajectory: TrajectoryView
-    tube: TubeView
-    uncertainty: UncertaintyView
-    disturbance: DisturbanceView
-    obstacles: tuple[ObstacleView, ...]
 
     def part(self, name: str) -> Mapping[str, Tree]:
         """A section as it stands, to be shown; empty if there is none."""
@@ -176,17 +171,8 @@ class Effective:
     @classmethod
     def of(cls, data: Mapping[str, Tree], path: str = "effective") -> Effective:
         """The views of canonical data; raises `FormError`."""
-        view = from_json(_View, data, path)
-        return cls(
-            data=data,
-            name=view.name,
-            system=view.system,
-            trajectory=view.trajectory,
-            tube=view.tube,
-            uncertainty=view.uncertainty,
-            disturbance=view.disturbance,
-            obstacles=view.obstacles,
-        )
+        view = from_json(View, data, path)
+        return cls(data=data, **{item.name: getattr(view, item.name) for item in fields(view)})
 
 
 def as_file(data: Mapping[str, Tree]) -> dict[str, Tree]:

@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
+from tubecert.bounds.clearance import Shape
 from tubecert.certificate.effective import Asked, Effective
 from tubecert.certificate.notes import joined, split
 from tubecert.claims.family import Assumption, Reason
 from tubecert.claims.outcomes import Outcome
+from tubecert.conditions.inputs import InputBound
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.kinds.kind import Pair, SectionData
@@ -104,14 +106,6 @@ class SynthesisData:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ShapeData:
-    """Bounds over the tube of the block of W in a plane: of its diagonal, and [low, high] of what is beside it."""
-
-    diagonal: tuple[float, float]
-    beside: tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ClearanceData:
     """An obstacle of the specification, in its order: the clearance of the tube, and the time at which it is least.
 
@@ -121,7 +115,7 @@ class ClearanceData:
     verdict: Verdict
     decides: bool
     clearance: Constant
-    shape: ShapeData
+    shape: Shape
     t: float | None = None
     inside: tuple[float, float] | None = None
 
@@ -135,16 +129,6 @@ class PlanInputData:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InputBoundData:
-    """The input stays in [least, greatest] with the gains in `proof`; what feedback and adaptation add at most."""
-
-    least: float
-    greatest: float
-    feedback: float
-    adaptation: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class InputData:
     """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key."""
 
@@ -152,7 +136,7 @@ class InputData:
     limits: tuple[Fraction, Fraction]
     verdict: Verdict
     plan: PlanInputData
-    bounds: Mapping[str, InputBoundData]
+    bounds: Mapping[str, InputBound]
 
     def use(self, kinds: Iterable[str]) -> float | None:
         """The share of its limits that it uses at most: 0 in the middle, 1 at a limit; None without bounds."""

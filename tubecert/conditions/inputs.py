@@ -40,11 +40,12 @@ def shares(n: Numbers[Interval], distance: Interval, radius: Fraction | None) ->
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputBound:
-    """An input stays in [least, greatest], with the shares of feedback and adaptation at most."""
+    """The input stays in [least, greatest] with the gains of a proof; what feedback and adaptation add at most."""
 
     least: float
     greatest: float
-    shares: InputShares
+    feedback: float
+    adaptation: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +70,8 @@ class LimitedInput:
         return InputBound(
             least=printable_below(Fraction(low) - added),
             greatest=printable_above(Fraction(high) + added),
-            shares=own,
+            feedback=own.feedback,
+            adaptation=own.adaptation,
         )
 
     def holds(self, bound: InputBound) -> bool:

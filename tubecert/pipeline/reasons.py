@@ -105,11 +105,11 @@ def _beyond(judged: JudgedInput, deciding: tuple[str, ...]) -> Reason:
         plan=own.greatest.above if upper else own.least.below,
         section=section,
         reaches=bound.greatest if upper else bound.least,
-        feedback=bound.shares.feedback,
-        adaptation=bound.shares.adaptation,
+        feedback=bound.feedback,
+        adaptation=bound.adaptation,
     )
     # without any feedback it would be less by that
-    helps = _excess(own, bound) < Fraction(bound.shares.feedback)
+    helps = _excess(own, bound) < Fraction(bound.feedback)
     relax = (ShrinkTube(), LeavePlanRoom()) if helps else (LeavePlanRoom(),)
     return Reason(claim=claim, verdict=judged.verdict, relax=relax)
 

@@ -14,7 +14,6 @@ from tubecert.certificate.result import (
     Bound,
     ClearanceData,
     Geodesics,
-    InputBoundData,
     InputData,
     MetricData,
     Overrides,
@@ -22,7 +21,6 @@ from tubecert.certificate.result import (
     PlanInputData,
     Recipes,
     Result,
-    ShapeData,
     Source,
     TubeData,
     Work,
@@ -229,13 +227,12 @@ def _constants(reached: _Reached) -> dict[str, Bound]:
 
 def clearance_data(found: Cleared) -> ClearanceData:
     """An obstacle, as it is written."""
-    shape = found.shape
     return ClearanceData(
         verdict=found.verdict,
         decides=found.obstacle.decides,
         clearance=found.clearance,
         t=found.found.t,
-        shape=ShapeData(diagonal=(shape.first, shape.second), beside=(shape.low, shape.high)),
+        shape=found.shape,
         inside=found.found.inside,
     )
 
@@ -248,15 +245,7 @@ def _input_data(found: JudgedInput) -> InputData:
         limits=own.limits,
         verdict=found.verdict,
         plan=PlanInputData(least=own.least, greatest=own.greatest),
-        bounds={
-            key: InputBoundData(
-                least=bound.least,
-                greatest=bound.greatest,
-                feedback=bound.shares.feedback,
-                adaptation=bound.shares.adaptation,
-            )
-            for key, bound in found.bounds.items()
-        },
+        bounds=found.bounds,
     )
 
 

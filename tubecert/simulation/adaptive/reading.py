@@ -16,9 +16,10 @@ import numpy as np
 
 from tubecert.certificate.belonging import as_set, compared
 from tubecert.certificate.file import incomplete
-from tubecert.certificate.result import InputBoundData, Result
+from tubecert.certificate.result import Result
 from tubecert.claims.advice import advice
 from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.inputs import InputBound
 from tubecert.conditions.rates import RateRecipe
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
@@ -172,7 +173,7 @@ class Promise:
 
     bounds: Mapping[str, float]
     half_widths: Mapping[str, float]
-    ranges: Mapping[str, InputBoundData]
+    ranges: Mapping[str, InputBound]
     ultimate: float | None = None
     decay: Decay | None = None
 
