@@ -296,7 +296,7 @@ IN_X = Fields(SimpleNamespace(states=("x", "y")), None)  # no coordinates of the
 
 def test_lipschitz_constants_are_tight_where_a_norm_vanishes():
     h = constant(2) + norm([x, y]) * Fraction(1, 10)
-    from tubecert.bounds.lipschitz import lipschitz_constant as _lipschitz
+    from tubecert.bounds.searches import lipschitz_constant as _lipschitz
 
     found = supremum(_lipschitz((h,), IN_X), ball(0.5, 0, 0), Effort())
     assert abs(found.above - 0.1) < 1e-6
@@ -305,7 +305,7 @@ def test_lipschitz_constants_are_tight_where_a_norm_vanishes():
 
 @pytest.mark.slow
 def test_nested_norms_have_the_product_of_their_slopes():
-    from tubecert.bounds.lipschitz import lipschitz_constant as _lipschitz
+    from tubecert.bounds.searches import lipschitz_constant as _lipschitz
 
     objective = _lipschitz((norm([3 * norm([x, y]), 2 * x]),), IN_X)
     assert isinstance(objective, Lipschitz)
@@ -327,7 +327,7 @@ def test_nested_norms_have_the_product_of_their_slopes():
 )
 def test_a_branch_that_divides_by_zero_is_no_bound_and_no_error(h, lower, most):
     """For x < 0 there is no 1/(x + abs(x)); where x > 0 nothing depends on that."""
-    from tubecert.bounds.lipschitz import lipschitz_constant as _lipschitz
+    from tubecert.bounds.searches import lipschitz_constant as _lipschitz
 
     parsed = parse(h, symbols=SYMBOLS, kinks=True).expression
     found = supremum(_lipschitz((parsed,), IN_X), box(x=(lower, 2), y=(-1, 1)), Effort(budget=20_000))

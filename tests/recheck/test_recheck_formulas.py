@@ -35,7 +35,7 @@ from tubecert.recheck.conditions import (
     tight_kernel,
 )
 from tubecert.recheck.kinds import alone
-from tubecert.recheck.kinds.bounds import ultimate
+from tubecert.recheck.kinds.kind import ultimate
 
 F = Fraction
 BITS, CLOSE = 160, 1e-25

@@ -18,8 +18,8 @@ from tubecert.recheck.run import recheck
 from tubecert.report import planned
 from tubecert.report.reach import excursion
 from tubecert.spec import Knots, load
-from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import piecewise_plan
+from tubecert.trajectory.plan import Defect
 from tubecert.tube import containment
 from tubecert.verdict import Verdict
 

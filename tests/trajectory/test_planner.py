@@ -155,7 +155,7 @@ def test_sub_knots_are_placed_until_the_defect_is_negligible(interpolation):
     plan = laid(spec, MODEL, ROOM)
     assert plan.knots.interpolation == interpolation
     assert len(plan.pieces) > 100
-    from tubecert.trajectory.defect import Defect
+    from tubecert.trajectory.plan import Defect
 
     delta = Defect.of(plan, MODEL, 0.7, Effort()).in_metric()
     assert delta.above < ROOM.allowed(MODEL)

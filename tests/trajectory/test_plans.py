@@ -26,8 +26,8 @@ from tubecert.findings import Severity
 from tubecert.pipeline import Options, certify, inspect
 from tubecert.spec import Knots, canonical, load, load_text
 from tubecert.spec.table import MAX_ROWS
-from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import TAU, piecewise_plan
+from tubecert.trajectory.plan import Defect
 from tubecert.tube import Tube, containment
 from tubecert.verdict import Verdict
 

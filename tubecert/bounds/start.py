@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tubecert.bounds.lipschitz import substituted
+from tubecert.bounds.searches import substituted
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.branch_and_bound import supremum
 from tubecert.enclosure.constant import Constant

@@ -15,9 +15,8 @@ from tubecert.bounds.clearance import Shape
 from tubecert.bounds.constants import Constant
 from tubecert.bounds.feedback import MU, ClosedFormGain, exact_gain
 from tubecert.bounds.linear import LEAST, linear_bound
-from tubecert.bounds.lipschitz import lipschitz_constant, substituted
 from tubecert.bounds.multiplier import eased_bound
-from tubecert.bounds.searches import Searches
+from tubecert.bounds.searches import Searches, lipschitz_constant, substituted
 from tubecert.coordinates import Fields
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.constant import printable_above, printable_below
@@ -34,7 +33,7 @@ from tubecert.expression import (
 )
 from tubecert.expression.matrix import Matrix, column, constants, identity, multiply, transpose
 from tubecert.model import TIME
-from tubecert.trajectory.defect import Defect
+from tubecert.trajectory.plan import Defect
 
 _SAME = 1e-5  # of a half-width that cuts nothing off the ellipsoid
 _BESIDE = 500  # boxes beside a bound by the linear part

@@ -25,9 +25,9 @@ from tubecert.printable import visible
 from tubecert.spec import Knots, Spec, canonical, load, load_text
 from tubecert.spec.types import Bundle
 from tubecert.trajectory import Plan
-from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import TAU
+from tubecert.trajectory.plan import Defect
 
 NO_MEMBER, UNDECIDED = "TC411", "TC412"
 _FINE = 1e-9  # relative to the range: how closely a curve is looked at

@@ -22,9 +22,9 @@ from tubecert.planner.ilqr import Dynamics
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.release import __version__
 from tubecert.spec import Knots, Spec, Task, canonical
-from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.make import Room, misses
 from tubecert.trajectory.pieces import piecewise_plan
+from tubecert.trajectory.plan import Defect
 
 _DIGITS = 12
 _MOST_PIECES = 20_000

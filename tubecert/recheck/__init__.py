@@ -13,7 +13,7 @@ formula or rounding in the producer must not pass both.
 | `boxes` | what terms can be on a box: polynomials of second order, their vertices, and what they leave |
 | `statements` | norms, definiteness and signs at those vertices |
 | `pencils`, `multiplier`, `norms`, `lipschitz` | statements of other kinds: pencils, columns over a ball, kinks |
-| `cover` | a claim over a domain, by splitting boxes that cover it |
+| `cover` | one claim; a claim over a domain, by splitting boxes that cover it |
 | `curve`, `tube` | the plan as segments that enclose it, or a family of plans; boxes around it |
 | `document`, `specified.numbers` | JSON and expressions, read and checked for form |
 | `specification` with its parts in `specified`, `certificate` | closed types of all that a certificate may say |
@@ -24,6 +24,6 @@ formula or rounding in the producer must not pass both.
 | `wind` | claims about a disturbance, and about parameters of which ranges are known |
 | `conditions` | the theorems A and B at printed numbers |
 | `kinds` | the section of each kind of certificate: how it is read, what is examined of it |
-| `examination`, `consistency`, `refuted` | one claim; what must agree, and what is claimed; what refutes |
+| `consistency`, `refuted` | what must agree, and what is claimed; what refutes |
 | `claims` | all claims in their order |
 """

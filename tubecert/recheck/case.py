@@ -12,9 +12,9 @@ from tubecert.recheck import wind as disturbed
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.conditions import USED, Numbers, Setting, WindNumbers
 from tubecert.recheck.coordinates import Coordinates
+from tubecert.recheck.cover import SHARP
 from tubecert.recheck.curve import Curve
 from tubecert.recheck.document import Enclosure, digest
-from tubecert.recheck.examination import SHARP
 from tubecert.recheck.kinds.kind import Section
 from tubecert.recheck.place import Place
 from tubecert.recheck.result import INFIMA, MEASURED, MetricSection, Result, TubeSection

@@ -20,8 +20,7 @@ from tubecert.recheck import (
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.case import Case
 from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width, largest_push
-from tubecert.recheck.cover import Outcome, stated, together
-from tubecert.recheck.examination import SHARP, Claim
+from tubecert.recheck.cover import SHARP, Claim, Outcome, stated, together
 from tubecert.recheck.kinds.kind import Ground, Kind, Section
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.plans import serves

@@ -4,21 +4,25 @@ What is split first is heuristic; a box is left only when the statement is prove
 contain no point of the domain. A point of the domain at which the statement is proven false contradicts it.
 
 A claim ends, undecided, when the time of an examination is up; somebody may be told how far it is.
+
+A `Claim` is a statement of a certificate with everything that it depends on. Equal keys mean equal outcomes: a memory
+of outcomes may be shared between certificates that differ in a field or two.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from math import inf
 from typing import Any, Literal, Protocol
 
-from flint import arb
+from flint import arb, ctx
 
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
 from tubecert.recheck.boxes import Found, Test
@@ -244,3 +248,35 @@ class Boxed:
 def as_ball(x: Fraction | Ball) -> Ball:
     """An end of a range as a ball."""
     return exact(x) if isinstance(x, Fraction) else x
+
+
+BOXES = 64  # bits, for boxes
+SHARP = 160  # bits, for formulas at decimals
+
+Memory = MutableMapping[str, Outcome]
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A statement of the certificate, what it depends on (None: it is examined each time), and how to examine it."""
+
+    name: str
+    key: tuple[object, ...] | None
+    examine: Callable[[], Outcome] = field(repr=False)
+    bits: int = BOXES
+
+    def outcome(self, memory: Memory | None = None) -> Outcome:
+        """The outcome; what arithmetic cannot represent is undecided."""
+        if memory is None or self.key is None:
+            return self._examined()
+        name = json.dumps([self.name, self.key], default=str, sort_keys=True)
+        if name not in memory:
+            memory[name] = self._examined()
+        return memory[name]
+
+    def _examined(self) -> Outcome:
+        with ctx.workprec(self.bits):
+            try:
+                return self.examine()
+            except (ArithmeticError, ValueError) as error:
+                return Outcome(verdict="undecided", why=f"it cannot be evaluated: {error}")

@@ -12,8 +12,7 @@ from fractions import Fraction
 
 from tubecert.recheck.cover import Outcome, stated, together
 from tubecert.recheck.document import Enclosure, Node, enclosure, reads
-from tubecert.recheck.kinds.bounds import all_of, at_most
-from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements
+from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements, all_of, at_most
 from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.numbers import Range

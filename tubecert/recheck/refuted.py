@@ -22,9 +22,8 @@ from flint import arb, ctx, fmpq, fmpq_mat
 from tubecert.recheck import metric, start
 from tubecert.recheck.balls import Ball, exact, floor, is_indefinite
 from tubecert.recheck.case import Case
-from tubecert.recheck.cover import CONFIRMED, Outcome, stated
+from tubecert.recheck.cover import CONFIRMED, SHARP, Claim, Outcome, stated
 from tubecert.recheck.curve import Segment
-from tubecert.recheck.examination import SHARP, Claim
 from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.program import Program
 from tubecert.recheck.reasons import Reason

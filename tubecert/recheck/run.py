@@ -11,9 +11,8 @@ from tubecert.recheck import refuted
 from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.claims import of_certified, of_every
-from tubecert.recheck.cover import Outcome, stated, telling, time_is_up, within
+from tubecert.recheck.cover import Claim, Memory, Outcome, stated, telling, time_is_up, within
 from tubecert.recheck.document import SAMPLED_LOOP, Node, read
-from tubecert.recheck.examination import Claim, Memory
 from tubecert.recheck.result import Certificate
 from tubecert.recheck.sampled_loop import claims as sampled_loop
 from tubecert.recheck.sampled_loop.record import NOT_EXAMINED

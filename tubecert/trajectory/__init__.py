@@ -5,9 +5,8 @@ of its defect p = x*' - f(x*) - B(x*) u*. Trusted: yes, but for the planner.
 
 | module | what it does | trusted |
 |---|---|---|
-| `plan` | a plan as expressions of t: what every plan can be asked; every plan at once, x* and u* in boxes | yes |
+| `plan` | a plan as expressions of t: what every plan can be asked; every plan at once; sup |p| | yes |
 | `pieces`, `hermite` | a plan through knots: cubic Hermite pieces, and their data as intervals | yes |
-| `defect` | sup |p| and sup |Theta(x*) p| | yes |
 | `make` | specification -> plan; sub-knots until the defect is negligible | yes |
 """
 

@@ -21,9 +21,8 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.model import ControlAffineModel
 from tubecert.spec import Knots, Spec, Task
-from tubecert.trajectory.defect import Defect
 from tubecert.trajectory.pieces import piecewise_plan
-from tubecert.trajectory.plan import Plan, family
+from tubecert.trajectory.plan import Defect, Plan, family
 
 _SHARE = 1e-3  # of the tube that a planned curve's defect may cost
 MISS = Fraction(

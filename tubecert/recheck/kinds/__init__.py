@@ -6,7 +6,6 @@ The keys are those of `tubecert.kinds`, from which nothing is imported. A new ki
 
 | module | what it is |
 |---|---|
-| `kind` | what every kind offers, and what its claims rest on |
-| `bounds` | printed numbers against those of this room |
+| `kind` | what every kind offers, what its claims rest on, printed numbers against those of this room |
 | `alone`, `rates`, `distance` | 0, A and B |
 """

@@ -9,11 +9,19 @@ from typing import ClassVar
 
 from tubecert.recheck.balls import Ball, exact, larger, root
 from tubecert.recheck.conditions import Setting, margin
-from tubecert.recheck.cover import Outcome, stated
+from tubecert.recheck.cover import Claim, Outcome, stated
 from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
-from tubecert.recheck.examination import Claim
-from tubecert.recheck.kinds.bounds import all_of, at_least, at_most, margin_at_least, no_radius
-from tubecert.recheck.kinds.kind import Ground, Kind, Section, Shares
+from tubecert.recheck.kinds.kind import (
+    Ground,
+    Kind,
+    Section,
+    Shares,
+    all_of,
+    at_least,
+    at_most,
+    margin_at_least,
+    no_radius,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

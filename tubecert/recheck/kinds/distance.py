@@ -18,18 +18,8 @@ from tubecert.recheck.conditions import (
     margin,
     own_distance_proof,
 )
-from tubecert.recheck.cover import Outcome, stated
+from tubecert.recheck.cover import Claim, Outcome, stated
 from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
-from tubecert.recheck.examination import Claim
-from tubecert.recheck.kinds.bounds import (
-    all_of,
-    margin_at_least,
-    no_radius,
-    not_shown_to_hold,
-    told,
-    ultimate,
-    words,
-)
 from tubecert.recheck.kinds.kind import (
     Asked,
     Ground,
@@ -37,6 +27,13 @@ from tubecert.recheck.kinds.kind import (
     Section,
     Shares,
     Statements,
+    all_of,
+    margin_at_least,
+    no_radius,
+    not_shown_to_hold,
+    told,
+    ultimate,
+    words,
 )
 
 

@@ -8,10 +8,15 @@ from fractions import Fraction
 from typing import ClassVar
 
 from tubecert.recheck.conditions import Gains, Setting, derived, margins_26, own_distance_proof
-from tubecert.recheck.cover import Outcome, stated
+from tubecert.recheck.cover import Claim, Outcome, stated
 from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
-from tubecert.recheck.examination import Claim
-from tubecert.recheck.kinds.bounds import (
+from tubecert.recheck.kinds.kind import (
+    Asked,
+    Ground,
+    Kind,
+    Section,
+    Shares,
+    Statements,
     all_of,
     at_most,
     margin_at_least,
@@ -20,14 +25,6 @@ from tubecert.recheck.kinds.bounds import (
     told,
     ultimate,
     words,
-)
-from tubecert.recheck.kinds.kind import (
-    Asked,
-    Ground,
-    Kind,
-    Section,
-    Shares,
-    Statements,
 )
 
 CONDITIONS = ("26a", "26b", "26c")

@@ -13,10 +13,9 @@ from flint import arb, arb_mat
 
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.clearances import along, contains, somewhere
-from tubecert.recheck.cover import CONFIRMED, Outcome, stated, together
+from tubecert.recheck.cover import CONFIRMED, Claim, Outcome, stated, together
 from tubecert.recheck.cover import Range as Ends
 from tubecert.recheck.curve import Segment
-from tubecert.recheck.examination import Claim
 from tubecert.recheck.metric import smooth
 from tubecert.recheck.obstacles import Obstacle, Point
 from tubecert.recheck.plans import serves
