@@ -16,7 +16,7 @@ from tubecert.expression import Side, constant, full_text, number_text, to_text
 from tubecert.spec import codes
 from tubecert.spec.document import Scalar
 from tubecert.spec.reader import Field, whole
-from tubecert.spec.values import Ends, Matrix, Term, TermMatrix, Vector
+from tubecert.spec.values import Matrix, Term, TermMatrix, Vector
 
 if TYPE_CHECKING:
     from tubecert.spec.names import Names  # which reads tables by keys
@@ -249,20 +249,14 @@ def expressions(whose: Whose, scope: str) -> Kind:
     return Kind(read, TEXTS, texts)
 
 
-def inward(end: str = "end") -> Kind:
-    """[lower, upper]; with pi in it, rounded inward: what stays in it stays in the one that was written."""
-
-    def read(field: Field, names: Names) -> Ends | None:
-        ends = field.items(2, "numbers")
-        if ends is None:
-            return None
-        low, high = ends[0].number(names.values, side="above"), ends[1].number(names.values, side="below")
-        if low is None or high is None or low < high:
-            return None if low is None or high is None else (low, high)
-        message = f"{field.path}: the lower {end} must be below the upper {'one' if end == 'limit' else end}"
-        return field.fail(codes.RANGE, message, "write [lower, upper]")
-
-    return Kind(read, PAIR, numbers_text)
+def ends(*, inward: str = "", order: str = "", **more: Any) -> Kind:
+    """[lower, upper], rounded outward if it has pi in it; `inward`: what an end is called of a set that is rounded
+    inward, as what stays in it stays in the one that was written; else as in `Field.ends`.
+    """
+    if inward:
+        order = f"the lower {inward} must be below the upper {'one' if inward == 'limit' else inward}"
+        more = {"sides": ("above", "below")}
+    return Kind(lambda field, names: field.ends(names.values, order=order, **more), PAIR, numbers_text)
 
 
 def named(whose: Whose, kind: Kind, shown: str = "") -> Kind:

@@ -16,7 +16,7 @@ from tubecert.expression import number_text
 from tubecert.spec import codes, keys
 from tubecert.spec.document import ListNode, MappingNode, Scalar
 from tubecert.spec.instead import same_as
-from tubecert.spec.keys import CHOSEN, NUMBER, Kind, entry, inward, key, named, number, says, section, word
+from tubecert.spec.keys import CHOSEN, NUMBER, Kind, ends, entry, key, named, number, says, section, word
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
 from tubecert.spec.tube import EXPECT
@@ -30,7 +30,7 @@ ONE_SAMPLE: Final = "one sample"
 MAX_LATE: Final = 64  # samples of delay: every one is a state of the loop
 
 CONTROLLER: Final = word("auto", "none")
-LIMITS: Final = named("inputs", inward("limit"), "[-1, 1]")
+LIMITS: Final = named("inputs", ends(inward="limit"), "[-1, 1]")
 IN_CONTINUOUS_TIME: Final = ("metric", "adaptation", "conditions")
 """Sections of a file that asks about a loop in continuous time."""
 

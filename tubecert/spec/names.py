@@ -32,11 +32,17 @@ from tubecert.spec.document import ListNode, Scalar
 from tubecert.spec.lookup import read_lookup
 from tubecert.spec.reader import Field
 from tubecert.spec.scope import Scope
-from tubecert.spec.values import Output, Term
+from tubecert.spec.values import Ends, Output, Term
 
 TIME: Final = "t"
 MAX_STATES: Final = 32
+_KNOWN: Final = "write one number, or [lower, upper]"
 _SHOWN: Final = 40  # characters of an expression
+_NO_TABLE: Final = "{} is a table; tables may be used in f, B, h and plans, not in a metric or in E"
+_A_RANGE: Final = (
+    "{} is known by a range only; such a parameter may be used in f and B alone (elsewhere use its middle, by a name "
+    "of its own)"
+)
 _NO_INPUT: Final = (
     "what is proven is how near a controller keeps to a plan: name what it could move, with its column of B; of a "
     "plant that is stable by itself it need not move anything: hardware: {rate: 500} and controller: none"
@@ -62,7 +68,7 @@ class Names:
     parameters: tuple[tuple[str, Fraction], ...]
     irrational: tuple[tuple[str, Expression], ...] = ()  # parameters that contain pi
     definitions: tuple[tuple[str, Parsed], ...] = ()
-    ranges: tuple[tuple[str, tuple[Fraction, Fraction]], ...] = ()
+    ranges: tuple[tuple[str, Ends], ...] = ()
     tables: tuple[tuple[str, Lookup], ...] = ()
     outputs: tuple[Output, ...] = ()
     rates: tuple[tuple[str, str], ...] = ()  # what people call the derivatives of states, and what to say
@@ -79,73 +85,55 @@ class Names:
 
     def of_state(self) -> Scope:
         """For the dual metric and E: states and parameters."""
-        refused = {
-            TIME: "t is allowed in f, h and a trajectory only; B and the metric depend on the state alone",
-            **self._inputs_refused(),
-            **dict(self.rates),
-        }
-        refused |= {
-            name: f"{name} is a table; tables may be used in f, B, h and plans, not in a metric or in E"
-            for name, _ in self.tables
-        }
-        return self._scope(self.states, refused | self._ranges_refused(), tables=False)
+        return self._scope(*self.states, tables=False)
+
+    def of_plant(self) -> Scope:
+        """For B: the same as for E, tables, and parameters of which a range is known."""
+        return self._scope(*self.states, *dict(self.ranges))
 
     def of_drift(self) -> Scope:
         """For f: the same as for B, and time."""
-        return self._of_plant((*self.states, TIME, *dict(self.ranges)))
-
-    def of_plant(self) -> Scope:
-        """For B: the same as for E, and parameters of which a range is known."""
-        return self._of_plant((*self.states, *dict(self.ranges)))
-
-    def _of_plant(self, names: tuple[str, ...]) -> Scope:
-        known = {*names, *dict(self.tables)}
-        refused = {name: why for name, why in self.of_state().refused.items() if name not in known}
-        return self._scope(names, refused)
+        return self._scope(*self.states, *dict(self.ranges), TIME)
 
     def of_uncertainty(self) -> Scope:
         """For h: states, time and parameters; abs and norm are allowed."""
-        refused = dict(self.rates) | self._inputs_refused() | self._ranges_refused()
-        return self._scope((*self.states, TIME), refused, kinks=True)
+        return self._scope(*self.states, TIME, kinks=True)
 
     def of_definition(self) -> Scope:
         """For a definition: whatever any expression may use."""
-        names = (*self.states, TIME, *dict(self.ranges))
-        return self._scope(names, dict(self.rates) | self._inputs_refused(), kinks=True)
+        return self._scope(*self.states, *dict(self.ranges), TIME, kinks=True)
 
     def of_plan(self) -> Scope:
         """For a trajectory: time and parameters."""
-        refused = {name: f"{name} is a state; a plan is a function of t alone" for name in self.states}
-        refused |= {name: f"{name} is an input; a plan is a function of t alone" for name in self.inputs}
-        return self._scope((TIME,), refused | self._ranges_refused())
+        return self._scope(TIME)
 
-    def _scope(
-        self, variables: tuple[str, ...], refused: dict[str, str], *, kinks: bool = False, tables: bool = True
-    ) -> Scope:
+    def _scope(self, *variables: str, kinks: bool = False, tables: bool = True) -> Scope:
         """Parameters, variables, and the definitions that stand for expressions of these."""
-        symbols = self.values | _symbols(variables)
+        symbols = self.values | {name: symbol(name) for name in variables}
+        refused = {name: why for name, why in self._refused(variables) if name not in variables}
+        if not tables:
+            refused |= {name: _NO_TABLE.format(name) for name, _ in self.tables}
         owed: dict[str, tuple[Obligation, ...]] = {name: () for name, _ in self.irrational}
         for name, parsed in self.definitions:
             why = _foreign(name, parsed, variables, refused, kinks=kinks, tables=tables)
             if why is None:
                 symbols[name], owed[name] = parsed.expression, parsed.obligations
             else:
-                refused = {**refused, name: why}
+                refused[name] = why
         known = dict(self.tables) if tables else {}
         return Scope(symbols=symbols, tables=known, refused=refused, kinks=kinks, owed=owed)
 
-    def _ranges_refused(self) -> dict[str, str]:
-        return {
-            name: f"{name} is known by a range only; such a parameter may be used in f and B alone (elsewhere use "
-            "its middle, by a name of its own)"
-            for name, _ in self.ranges
-        }
-
-    def _inputs_refused(self) -> dict[str, str]:
-        return {
-            name: f"{name} is an input; inputs enter through B only (x' = f(x) + B(x) u)"
-            for name in self.inputs
-        }
+    def _refused(self, variables: Collection[str]) -> Iterator[tuple[str, str]]:
+        """Why names of the file may not stand where these variables do, which are t alone in a plan."""
+        plan = not set(self.states) & set(variables)
+        through = (
+            "a plan is a function of t alone" if plan else "inputs enter through B only (x' = f(x) + B(x) u)"
+        )
+        yield TIME, "t is allowed in f, h and a trajectory only; B and the metric depend on the state alone"
+        yield from () if plan else self.rates
+        yield from ((name, f"{name} is a state; {through}") for name in self.states)
+        yield from ((name, f"{name} is an input; {through}") for name in self.inputs)
+        yield from ((name, _A_RANGE.format(name)) for name, _ in self.ranges)
 
 
 def _foreign(
@@ -166,10 +154,6 @@ def _foreign(
     if not tables and any(node.op == "table" for node in topological(parts)):
         return f"{name} contains a table; tables may be used in f, B, h and plans"
     return None
-
-
-def _symbols(names: tuple[str, ...]) -> dict[str, Expression]:
-    return {name: symbol(name) for name in names}
 
 
 def read_names(system: Mapping[str, Field]) -> Names | None:
@@ -260,43 +244,29 @@ def _with_article(what: str) -> str:
     return f"an {what}" if what[0] in "aeiou" else f"a {what}"
 
 
-Interval = tuple[Fraction, Fraction]
-
-
 def _read_parameters(
     field: Field | None, taken: dict[str, str]
-) -> tuple[dict[str, Expression], dict[str, Interval]]:
+) -> tuple[dict[str, Expression], dict[str, Ends]]:
     """Parameters in the order of the file: numbers, which may use those before them, and ranges.
 
-    An unreadable value stands as 1.
+    An unreadable value stands as 1, a range as [0, 1].
     """
     values: dict[str, Expression] = {}
-    ranges: dict[str, Interval] = {}
+    ranges: dict[str, Ends] = {}
     found = list(new_names(field, "of names to numbers", "parameter", taken))
     for i, (name, entry, _) in enumerate(found):
         later = [other for _, _, other in found[i + 1 :]]
         if isinstance(entry.node, ListNode):
-            ends = _read_range(entry, values)
+            ends = entry.ends(
+                values, counted=_KNOWN, help="write [lower, upper], or one number if it is known"
+            )
             if name is not None:
-                ranges[name] = ends
+                ranges[name] = ends or (Fraction(0), Fraction(1))
             continue
         value = None if _is_range(entry) or _is_early(entry, later) else entry.constant(values)
         if name is not None:  # of a value that is wrong the finding stands; users of it are not wrong too
             values[name] = ONE if value is None else value
     return values, ranges
-
-
-def _read_range(field: Field, values: Mapping[str, Expression]) -> Interval:
-    """[lower, upper], rounded outward; [0, 1] if it cannot be read."""
-    ends = field.items(2, "numbers", "write one number, or [lower, upper]")
-    if ends is None:
-        return Fraction(0), Fraction(1)
-    lower, upper = ends[0].number(values, side="below"), ends[1].number(values, side="above")
-    if lower is not None and upper is not None and lower >= upper:
-        message = f"{field.path}: the lower end must be below the upper end"
-        help = "write [lower, upper], or one number if it is known"
-        field.fail(codes.RANGE, message, help)
-    return (Fraction(0), Fraction(1)) if lower is None or upper is None else (lower, upper)
 
 
 _RANGE = re.compile(r"([0-9.eE]+) *(?:-|\.\.+|\u2013|to) *([0-9.eE]+)|.*(?:\+-|\+/-|\u00b1).*")

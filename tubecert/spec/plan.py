@@ -30,21 +30,13 @@ _AFTERWARDS: Final = word(*get_args(Afterwards))
 def read_ends(field: Field, names: Names, *, point: bool = False) -> Ends | None:
     """A range, of a `point` also a number, one without width; with pi in it, the least one that contains it."""
     if point and isinstance(field.node, Scalar):
-        fields = [field, field]
-    else:
-        what = "numbers, or one number" if point else "numbers"
-        fields = field.items(2, what, _of_one_number(field, names)) or []
-    if not fields:
-        return None
-    low, high = fields[0].number(names.values, side="below"), None
-    if low is not None:
-        high = fields[1].number(names.values, side="above")
-    if low is None or high is None:
-        return None
-    if low > high:
-        message = f"{field.path}: the lower end must not exceed the upper end"
-        return field.fail(codes.RANGE, message, "write [lower, upper]")
-    return low, high
+        low = field.number(names.values, side="below")
+        high = None if low is None else field.number(names.values, side="above")
+        return None if low is None or high is None else (low, high)
+    what = "numbers, or one number" if point else "numbers"
+    order = "the lower end must not exceed the upper end"
+    counted = _of_one_number(field, names)
+    return field.ends(names.values, what=what, order=order, counted=counted, equal=True)
 
 
 def _of_one_number(field: Field, names: Names) -> str:

@@ -30,7 +30,7 @@ from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scal
 from tubecert.spec.instead import example_of, glued, of_key, of_value, of_word
 from tubecert.spec.scope import MODERATE, Parameters, Scope, out_of_range
 from tubecert.spec.source import Mark, Source
-from tubecert.spec.values import Matrix, Term, TermMatrix
+from tubecert.spec.values import Ends, Matrix, Term, TermMatrix
 
 T = TypeVar("T")
 
@@ -206,6 +206,24 @@ class Field:
     def numbers(self, count: int, parameters: Parameters) -> tuple[Fraction, ...] | None:
         """A list of numbers."""
         return whole([item.number(parameters) for item in self.items(count, "numbers") or []], count)
+
+    def ends(
+        self,
+        parameters: Parameters,
+        *,
+        sides: tuple[Side, Side] = ("below", "above"),
+        order: str = "the lower end must be below the upper end",
+        help: str = "write [lower, upper]",
+        what: str = "numbers",
+        counted: str = "",
+        equal: bool = False,
+    ) -> Ends | None:
+        """[lower, upper], each rounded to its side if irrational: outward; `order` says that they are, or `equal`."""
+        items = zip(self.items(2, what, counted) or (), sides, strict=False)
+        low, high = whole((item.number(parameters, side=side) for item, side in items), 2) or (None, None)
+        if low is None or high is None or low < high or (equal and low == high):
+            return None if low is None or high is None else (low, high)
+        return self.fail(codes.RANGE, f"{self.path}: {order}", help)
 
     def matrix(self, n: int, parameters: Parameters) -> Matrix | None:
         """A square matrix of numbers, or a number that stands for a multiple of the identity."""

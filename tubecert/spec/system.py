@@ -108,7 +108,7 @@ class System:
 
 
 SYSTEM: Final = section(System)
-SAFE_SET: Final = each("states", keys.inward())
+SAFE_SET: Final = each("states", keys.ends(inward="end"))
 
 
 def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]:

@@ -199,14 +199,9 @@ def decides_data(letter: str | None, _spec: Any) -> dict[str, str]:
     return {} if letter is None else {"decides": letter}
 
 
-def _range(field: Field, names: Names) -> Ends | None:
-    least, most = field.numbers(2, names.values) or (None, None)
-    if least is None or most is None or least <= most:
-        return None if least is None or most is None else (least, most)
-    return field.fail(codes.RANGE, f"{field.path}: the range is empty", "write [least, most]")
-
-
-_RANGE: Final = Kind(_range, keys.PAIR, keys.numbers_text)
+_RANGE: Final = keys.ends(
+    sides=("nearest", "nearest"), order="the range is empty", help="write [least, most]", equal=True
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
