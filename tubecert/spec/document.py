@@ -15,7 +15,7 @@ import yaml
 
 from tubecert.findings import Finding
 from tubecert.spec import codes
-from tubecert.spec.source import MAX_NESTING, Mark, Source
+from tubecert.spec.source import Mark, Source
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +53,8 @@ class MappingNode(Placed):
 class BrokenNode(Placed):
     """Stands where something was refused (and reported)."""
 
+
+MAX_NESTING: Final = 50
 
 _PLAIN_TAGS = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("str", "int", "float", "seq", "map"))
 

@@ -13,7 +13,6 @@ from tubecert.printable import blanked
 from tubecert.spec import codes
 
 MAX_BYTES: Final = 1_000_000
-MAX_NESTING: Final = 50
 
 _CODES = {"unreadable": codes.UNREADABLE, "too_large": codes.LIMIT}
 SPECIFICATION: Final = Kind(most=MAX_BYTES, **_CODES, help="give the path of a specification (a YAML file)")
@@ -24,7 +23,6 @@ PLAN: Final = Kind(most=10_000_000, **_CODES)
 
 _BREAK = re.compile(r"\r\n|\r|\n")
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
-_INDICATORS = re.compile(r"([ \t]*)((?:[-?:][ \t]+)*)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,43 +94,12 @@ def decoded(path: str, data: bytes) -> Source:
 
 
 def check_limits(source: Source) -> None:
-    """Raises `SpecError` for what no YAML parser should see: size, control characters, deep nesting."""
+    """Raises `SpecError` for what no YAML parser should see: size and control characters."""
     if len(source.text) > MAX_BYTES:
         _refuse(source, 0, codes.LIMIT, f"the text is larger than {MAX_BYTES:,} bytes")
     if match := _CONTROL.search(source.text):
         name = f"U+{ord(match.group()):04X}"
         _refuse(source, match.start(), codes.YAML_SYNTAX, f"the character {name} is not allowed", "remove it")
-    _check_brackets(source)
-    _check_indentation(source)
-
-
-def _check_brackets(source: Source) -> None:
-    # Brackets inside quotes and comments are counted too: this only has to be cheap, and no real file has so
-    # many.
-    depth = 0
-    for match in re.finditer(r"[\[\]{}]", source.text):
-        depth = depth + 1 if match.group() in "[{" else max(0, depth - 1)
-        if depth > MAX_NESTING:
-            _refuse(source, match.start(), codes.LIMIT, f"brackets are nested more than {MAX_NESTING} deep")
-
-
-def _check_indentation(source: Source) -> None:
-    """Block collections nest only where the text moves to the right, also within a line (`- - -`)."""
-    columns: list[int] = []
-    for number, line in enumerate(source.lines):
-        match = _INDICATORS.match(line)
-        if match is None or match.end() == len(line):
-            continue
-        steps = [match.end(1)]
-        steps += [match.start(2) + step.end() for step in re.finditer(r"[-?:][ \t]+", match.group(2))]
-        for column in steps:
-            while columns and columns[-1] > column:
-                columns.pop()
-            if not columns or columns[-1] < column:
-                columns.append(column)
-            if len(columns) > MAX_NESTING:
-                start = source.starts[number] + column
-                _refuse(source, start, codes.LIMIT, f"the text is nested more than {MAX_NESTING} deep")
 
 
 def _refuse(source: Source, index: int, code: str, message: str, help: str = "") -> NoReturn:
