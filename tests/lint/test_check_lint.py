@@ -131,7 +131,7 @@ def test_each_finding_where_it_belongs(name):
 
 def test_every_code_is_met():
     met = {code for code, _, _ in CASES.values()} | {case[0] for case in TABLES.values()}
-    assert met == set(lint.CODES)
+    assert met == {code for code in vars(lint.codes).values() if str(code).startswith("TC")}
 
 
 def table(times=1.0, names="t,p,v,u", wrong=(), steps=60):

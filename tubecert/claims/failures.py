@@ -10,7 +10,7 @@ from tubecert.claims.family import Claim, Reason
 from tubecert.claims.outcomes import Outcome
 from tubecert.digits import near
 from tubecert.records import Tagged
-from tubecert.spec.codes import CODES
+from tubecert.spec.codes import title
 from tubecert.verdict import Verdict
 
 
@@ -84,7 +84,7 @@ class NotWritable(Failure):
     code: str
 
     def _told(self, reason: Reason) -> str:
-        return f"the metric cannot be written: {CODES[self.code]}"
+        return f"the metric cannot be written: {title(self.code)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,7 @@ would refute, a warning what is hardly meant, a note what is worth knowing. Trus
 
 | module | what it looks at |
 |---|---|
-| `codes` | finding codes with their meaning |
+| `codes` | finding codes, and how findings are made |
 | `names` | parameters, names, units, states that cannot change, empty expectations |
 | `plan` | plan and start in the safe set, room for the tube, equilibria, obstacles |
 | `table` | a plan from a file against the dynamics: rows, units of time, exchanged columns |
@@ -23,14 +23,14 @@ import numpy as np
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.domain import Range
 from tubecert.findings import Finding, Severity
-from tubecert.lint.codes import CODES, LEFT_OUT
+from tubecert.lint.codes import LEFT_OUT
 from tubecert.lint.metric import metric_findings, reach_findings
 from tubecert.lint.names import name_findings
 from tubecert.lint.plan import plan_findings
 from tubecert.lint.uncertainty import uncertainty_findings
 from tubecert.spec import Spec
 
-__all__ = ["CODES", "lint", "name_findings"]
+__all__ = ["lint", "name_findings"]
 
 
 def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:

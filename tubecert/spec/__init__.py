@@ -20,7 +20,6 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 """
 
 from tubecert.spec.canonical import canonical
-from tubecert.spec.codes import CODES
 from tubecert.spec.load import load, load_question, load_text
 from tubecert.spec.override import Setting
 from tubecert.spec.types import (
@@ -38,6 +37,6 @@ from tubecert.spec.types import (
 )
 
 __all__ = [
-    "CODES", "Hardware", "Interpolation", "Knots", "Obstacle", "Setting", "Simulation", "Spec", "Synthesis",
+    "Hardware", "Interpolation", "Knots", "Obstacle", "Setting", "Simulation", "Spec", "Synthesis",
     "Table", "Task", "Term", "Vector", "canonical", "load", "load_question", "load_text",
 ]  # fmt: skip
