@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
@@ -28,13 +28,6 @@ REFUTED = "TC504"
 UNDECIDED = "TC505"
 
 _LARGEST_RATE = "largest_rate"
-
-CODES: Mapping[str, str] = {
-    VERDICT_MISMATCH: "the verdict is not the expected one",
-    RANGE_MISMATCH: "a number of the certificate is outside its expected range",
-    REFUTED: "the certification refutes a claim",
-    UNDECIDED: "the certification could not decide",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

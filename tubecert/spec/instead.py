@@ -23,8 +23,8 @@ def glued(key: str, known: Collection[str]) -> str:
     return f"write `{name}: {value[:40]}`, with a blank after the colon" if colon and name in known else ""
 
 
-def example_of(key: str, *, missing: bool = True) -> str:
-    """How a key may be written that is missing, or has another name."""
+def example_of(key: str, *, missing: bool) -> str:
+    """How a key may be written that is `missing`, as the only one, or has another name."""
     whole = elsewhere("missing").get(key, "...") if missing else "..."
     return f"{key}: {elsewhere('examples').get(key, whole)}"
 

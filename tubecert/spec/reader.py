@@ -121,7 +121,7 @@ class Field:
         missing = [key for key in required if key not in fields and key not in meant]
         if missing:
             message = f"{self.path or self.reader.document} lacks {', '.join(missing)}"
-            help = f"add {', '.join(map(example_of, missing))}"
+            help = f"add {', '.join(example_of(key, missing=len(missing) == 1) for key in missing)}"
             if self.key is None:
                 self.fail(codes.MISSING_KEY, message, help)
             else:
