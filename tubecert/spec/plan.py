@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar, Final, Literal, get_args
 
-from tubecert.expression import ExpressionError, constant, parse_number, to_text
+from tubecert.expression import ExpressionError, constant, free_symbols, parse_number, to_text
 from tubecert.spec import codes, keys
 from tubecert.spec.algebra import is_positive_definite, is_positive_semidefinite
 from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.keys import SIZE, Kind, each, entry, expressions, form, key, number, numbers, section, word
-from tubecert.spec.names import Names
+from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
 from tubecert.spec.system import Uncertainty, no_uncertainty
 from tubecert.spec.table import COLUMNS, read_table
@@ -330,7 +330,9 @@ def _trimmed(
     found = equilibrium(plant, values.get("near", middle), tuple(u or [Fraction(0)] * len(plant.inputs)))
     if found is None:
         help = "give near: [...], a point beside one, or at and input with f(at) + B(at) input = 0"
-        return at.fail(codes.RANGE, "no equilibrium is found there in the safe set", help)
+        moving = TIME in free_symbols(term.expression for term in plant.f)
+        where = "of an f that depends on t" if moving else "there in the safe set"
+        return at.fail(codes.RANGE, f"no equilibrium is found {where}", help)
     return {
         key: tuple(keys.constant_term(at, own) for own in each) for key, each in zip("xu", found, strict=True)
     }
