@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Final
@@ -13,7 +13,7 @@ from tubecert.spec.document import MappingNode
 from tubecert.spec.keys import LIST, NAME, PAIR, form, key, number, numbers_text, section
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.plan import Trajectory, read_ends
-from tubecert.spec.reader import Field
+from tubecert.spec.reader import Field, whole
 from tubecert.spec.values import Ends, Vector
 
 _AT: Final = {"anyOf": [LIST, {"$ref": "#/$defs/start_by_state"}], "examples": [[0.01, 0], {"phi": "30 deg"}]}
@@ -56,56 +56,46 @@ def read_initial_state(
     def planned() -> Vector | None:
         return _start(trajectory, plan) if trajectory and plan else None
 
-    if plan is not None and plan.bundle is not None and (field is None or field.get("within") is None):
-        message = "a family of plans has no start of its own"
-        where = trajectory if field is None else field
-        if where is not None:
-            help = "write initial_state: {within: r}: how far from the start of its plan the state may be"
-            where.fail(codes.MISSING_KEY, message, help)
-        return InitialState(x0=None)
+    nowhere, where = InitialState(), field or trajectory
+    if where and plan and plan.bundle and (field is None or field.get("within") is None):
+        help = "write initial_state: {within: r}: how far from the start of its plan the state may be"
+        return where.fail(codes.MISSING_KEY, "a family of plans has no start of its own", help) or nowhere
     if field is None:
         return InitialState(x0=planned())
     entries = INITIAL_STATE.entries(field)
     if entries is None:
-        return InitialState(x0=None)
+        return nowhere
     if len(entries) != 1:
         message = "the initial state is a point, a box, or a radius around the plan's start"
-        field.fail(codes.MISSING_KEY, message, "write at: [...], box: {x: [low, high], ...}, or within: r")
-        return InitialState(x0=None)
+        help = "write at: [...], box: {x: [low, high], ...}, or within: r"
+        return field.fail(codes.MISSING_KEY, message, help) or nowhere
     if "within" in entries:
         radius = entries["within"].number(names.values, above=0, side="above")
         return InitialState(x0=planned(), within=radius)
     (given,) = entries.values()
-    if isinstance(given.node, MappingNode):
-        ends = _named_ends(given, planned, names, point="at" in entries)
-    else:
-        items = given.items(len(names.states), "numbers") or []
-        ends = [read_ends(item, names, point="at" in entries) for item in items]
-    box = tuple(end for end in ends if end is not None)
-    if len(box) < len(names.states):
-        return InitialState(x0=None)
+    box = _box(given, planned, names, point="at" in entries) or ()
     if (wide := sum(low < high for low, high in box)) > MAX_WIDE:
-        field.fail(
-            codes.LIMIT, f"the box of starts has {wide} sides of some width; at most {MAX_WIDE} are read"
-        )
-        return InitialState(x0=None)
-    centre = tuple((low + high) / 2 for low, high in box)
-    return InitialState(x0=centre, box=box if any(low < high for low, high in box) else ())
+        message = f"the box of starts has {wide} sides of some width; at most {MAX_WIDE} are read"
+        return field.fail(codes.LIMIT, message) or nowhere
+    return InitialState(x0=tuple((low + high) / 2 for low, high in box) or None, box=box if wide else ())
 
 
-def _named_ends(
+def _box(
     field: Field, planned: Callable[[], Vector | None], names: Names, *, point: bool
-) -> list[Ends | None]:
-    """Values or ranges by state; a state that is not named starts on the plan."""
+) -> tuple[Ends, ...] | None:
+    """Values or ranges of every state, or by state; a state that is not named starts on the plan."""
+    if not isinstance(field.node, MappingNode):
+        items = field.items(len(names.states), "numbers") or ()
+        return whole(read_ends(item, names, point=point) for item in items)
     entries = field.mapping(optional=names.states)
     if entries is None:
-        return []
+        return None
     start = planned() if len(entries) < len(names.states) else None
-    others = [None] * len(names.states) if start is None else [(value, value) for value in start]
-    return [
+    others: Sequence[Ends | None] = [(own, own) for own in start] if start else [None] * len(names.states)
+    return whole(
         read_ends(entries[name], names, point=point) if name in entries else other
         for name, other in zip(names.states, others, strict=True)
-    ]
+    )
 
 
 def _start(field: Field, plan: Trajectory) -> Vector | None:
@@ -116,9 +106,9 @@ def _start(field: Field, plan: Trajectory) -> Vector | None:
         return tuple((low + high) / 2 for low, high in plan.bundle.x)  # one of the starts that there may be
     if plan.task is not None:
         if not plan.task.start:
-            message = "the planner needs a start"
-            field.fail(codes.MISSING_KEY, message, "add initial_state: {at: [...]}, or trajectory.start")
-        return plan.task.start or None
+            help = "add initial_state: {at: [...]}, or trajectory.start"
+            return field.fail(codes.MISSING_KEY, "the planner needs a start", help)
+        return plan.task.start
     start = []
     for term in plan.x:
         try:
@@ -127,11 +117,10 @@ def _start(field: Field, plan: Trajectory) -> Vector | None:
             message = "the plan is not defined at t = 0"
             return field.reader.report(codes.RANGE, term.location, message, "the horizon begins at t = 0")
         if not value.is_constant:
-            return field.reader.report(
-                codes.MISSING_KEY,
-                term.location,
-                f"the plan starts at {to_text(value)[:60]}, which is not rational; initial_state is needed",
-                "add initial_state: {at: [...]}",
+            message = (
+                f"the plan starts at {to_text(value)[:60]}, which is not rational; initial_state is needed"
             )
+            help = "add initial_state: {at: [...]}"
+            return field.reader.report(codes.MISSING_KEY, term.location, message, help)
         start.append(value.fraction)
     return tuple(start)
