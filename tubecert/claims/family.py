@@ -16,7 +16,7 @@ from tubecert.verdict import Verdict
 Side = Literal["lower", "upper"]
 CONSTANTS: dict[
     str, tuple[str, str]
-] = {}  # symbol and words of each: `bounds.meanings` says what they are called
+] = {}  # symbol and words of each: `bounds.constants` says what they are called
 
 
 class Claim(Tagged):

@@ -89,7 +89,7 @@ def synth(
         metric.save(target)
     if plot and found.rows:
         from tubecert.report.figures_file import svg_file
-        from tubecert.report.figures_rates import rate_figures
+        from tubecert.report.figures_gains import rate_figures
 
         certificate.write_text(plot, svg_file(*rate_figures(found.search().table)))
     present(how, *_presented(found, system, target, how))

@@ -1,22 +1,16 @@
-"""Reports: a certificate or findings in, text for people out.
+"""Reports: what a command found in, a page out, and the page as text, HTML, Markdown or a card of a notebook.
 
-In: the certificate as data (never the objects that made it), or findings. Out: the console's text. Trusted:
-no; numbers are not computed here, they are only shown.
+In: certificates as data (never the objects that made them), summaries, findings. Out: text. Trusted: no; numbers are
+not computed here, they are only shown.
 
 | module | what it does |
 |---|---|
-| `terminal` | where text goes: colour or none, width, no trailing spaces |
-| `findings` | findings as text and as data |
-| `numbers`, `gains` | how numbers, and the gains of the three certificates, are shown |
-| `console`, `sections` | the report of a certification |
-| `synthesis`, `simulation` | the reports of synth and simulate |
-| `quantities` | the numbers of a certificate as a flat list |
-| `sweep`, `sweep_page`, `figures_sweep` | sweeps: table, page, curves and heat maps |
-| `comparison`, `figures_comparison` | certificates side by side |
-| `figures_file` | figures as files of their own |
-| `figures_rates` | the metrics that a synthesis compared, drawn over the rate |
-| `layout` | parts, titles and tables on a terminal |
-| `page`, `page_*`, `figures_*` | a certificate as a page with figures; `html` and `markdown` show it |
+| `page` | a page as data; `text`, `html`, `markdown`, `notebook` show it, `terminal` is where text goes |
+| `certificate_brief`, `certificate_page`, `sampled_loop`, `page_*` | the pages of certificates |
+| `simulation`, `sampled_simulation`, `synthesis`, `verification`, `rechecked` | those of what else a command found |
+| `sweep`, `comparison`, `findings` | those of several certificates, and of a check |
+| `claimed`, `reach`, `gains`, `shares`, `quantities` | what they have in common: claims, sizes, gains, numbers |
+| `figures_*`, `planned`, `outline` | drawings: `figures_axes` draws, `figures_file` makes files of them |
 | `github`, `junit`, `sarif` | findings for other programs |
 | `pages` | what `explain` shows |
 | `progress` | what is being proven right now, on stderr |

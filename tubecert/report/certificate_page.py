@@ -20,8 +20,7 @@ from tubecert.records import to_json
 from tubecert.report import claimed, reach
 from tubecert.report.certificate_brief import first_blocks, reasons
 from tubecert.report.figures_gains import gain_figures
-from tubecert.report.figures_time import input_figures, state_figures
-from tubecert.report.figures_tube import tube_figures
+from tubecert.report.figures_tube import input_figures, state_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.outline import tube_outline, widths
 from tubecert.report.page import (

@@ -1,18 +1,25 @@
-"""Figures of the gains: what a bandwidth costs in rate, what it leaves of the margins, which constants bind.
+"""Figures of trade-offs: what a bandwidth costs in adaptation rate, what metrics cost by their rates.
 
 In: `result` of a certificate. Out: figures. Curves and pairs are those of the certificate; nothing is computed.
 """
 
 from __future__ import annotations
 
-from tubecert.certificate.result import Result
+from collections.abc import Sequence
+from typing import Final
+
+from tubecert.certificate.result import MetricRow, Result
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.gains import NAMES, Gains, rows
 from tubecert.report.page import Figure
 
 STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b"}
-_LOWEST = -0.5  # margins below are not drawn
-_MOST = 12  # constants shown
+_DRAWN: Final = {
+    "condition_number": "condition number",
+    "input_gain": "beta / sqrt(a)",
+    "adaptation_rate": "least Γ (B)",
+}
+_FLOORS: Final = {"identity": ("m1", "least condition number"), "input": ("m2", "least input gain")}
 
 
 def gain_figures(result: Result) -> list[Figure]:
@@ -53,3 +60,26 @@ def _place(row: Gains) -> Point | None:
 
 def _told(row: Gains) -> str:
     return f"{NAMES[row.section]}, {row.which}: {row.text()}"
+
+
+def rate_figures(rows: Sequence[MetricRow]) -> list[Figure]:
+    """A figure for each quantity that any of the rows has."""
+    found = (
+        (key, label, [row for row in rows if getattr(row, key) is not None]) for key, label in _DRAWN.items()
+    )
+    return [_figure(key, label, known) for key, label, known in found if known]
+
+
+def _figure(key: str, label: str, rows: Sequence[MetricRow]) -> Figure:
+    x = Axis.around([float(row.rate) for row in rows], "rate λ (1/s)")
+    title = f"{label} against the rate"
+    chart = Chart(f"rates-{key}", title, x, Axis.around([getattr(row, key) for row in rows], label, log=True))
+    legend = []
+    for floor, (style, words) in _FLOORS.items():
+        points = sorted((float(row.rate), float(getattr(row, key))) for row in rows if row.floor == floor)
+        if points:
+            chart.line(points, style)
+            legend.append((style, words))
+        for point in points:
+            chart.dot(point, style, 3.0)
+    return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(legend))

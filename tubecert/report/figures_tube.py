@@ -1,17 +1,24 @@
-"""Figures of the tube: the plan, what is proven around it, the safe set, obstacles, witnesses.
+"""Figures of the tube: plan, what is proven around it, safe set, obstacles, witnesses; states and inputs over time.
 
-In: `result` of a certificate. Out: one figure per pair of states. Nothing is decided here.
+In: `result` of a certificate. Out: a figure per pair of states, per state and per input. Nothing is decided here.
 """
 
 from __future__ import annotations
 
-from tubecert.certificate.result import Result
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TypeAlias
+
+from tubecert.certificate.result import InputData, Result
 from tubecert.digits import near
+from tubecert.report import planned
 from tubecert.report.claimed import point
 from tubecert.report.figures_axes import Point
-from tubecert.report.figures_scene import Plane, draw_obstacles, scene
-from tubecert.report.outline import tube_outline
+from tubecert.report.figures_scene import Drawing, Plane, draw_obstacles, scene
+from tubecert.report.outline import tube_outline, widths
 from tubecert.report.page import Figure
+
+Band: TypeAlias = tuple[list[Point], list[Point]] | None
 
 
 def planes(result: Result) -> list[Plane]:
@@ -68,6 +75,61 @@ def _tube(result: Result, plane: Plane) -> Figure:
     if witnesses:
         legend.append(("witness", "witness"))
     return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(dict.fromkeys(legend)))
+
+
+def state_figures(result: Result) -> list[Figure]:
+    """Every state of the plan with its half-width."""
+    known, inside = widths(result), result.tube is not None and result.tube.rho_r is not None
+    words = ("safe set", "proven band" if inside else "tube, not proven to stay in the safe set", "plan")
+    system = result.spec.effective.system
+    drawings = (
+        Drawing(
+            key=f"state-{i}",
+            name=name,
+            unit=system.units.get(name, ""),
+            curve=curve,
+            band=None if known is None else _around(curve, known[name], known[name]),
+            limits=_range(result.safe_set[name]),
+            words=words,
+        )
+        for i, (name, curve) in enumerate(zip(system.states, planned.states(result), strict=False))
+    )
+    return [drawing.figure("tube" if inside else "unproven") for drawing in drawings]
+
+
+def input_figures(result: Result) -> list[Figure]:
+    """Every input of the plan, and what is proven of it in the loop of what decides."""
+    own, system = {each.input: each for each in result.inputs}, result.spec.effective.system
+    drawings = (
+        Drawing(
+            key=f"input-{i}",
+            name=name,
+            unit=system.units.get(name, ""),
+            curve=curve,
+            band=_input_band(result, own.get(name), curve),
+            limits=_range(own[name].limits) if name in own else None,
+            words=("limits", "proven range in the loop", "plan"),
+        )
+        for i, (name, curve) in enumerate(zip(system.inputs, planned.inputs(result), strict=False))
+    )
+    return [drawing.figure("tube") for drawing in drawings]
+
+
+def _range(ends: tuple[Fraction, Fraction]) -> Point:
+    return float(ends[0]), float(ends[1])
+
+
+def _around(curve: Sequence[Point], below: float, above: float) -> Band:
+    return [(t, v - below) for t, v in curve], [(t, v + above) for t, v in curve]
+
+
+def _input_band(result: Result, own: InputData | None, curve: Sequence[Point]) -> Band:
+    """Around u* by what feedback and adaptation add at most; None where nothing is proven."""
+    found = [] if own is None else [own.bounds[key] for key in result.decided_by if key in own.bounds]
+    if own is None or not found:
+        return None
+    below = own.plan.least.below - min(each.least for each in found)
+    return _around(curve, below, max(each.greatest for each in found) - own.plan.greatest.above)
 
 
 def _pair(plane: Plane, value: Point) -> str:
