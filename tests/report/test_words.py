@@ -116,7 +116,7 @@ def test_every_word_has_meaning_and_source(word):
     assert told.startswith(f"{word}: ")
     assert "\n\nSource: docs/" in told
     assert max(map(len, told.splitlines())) <= 100
-    assert (proven.CONFIGS.parent / pages.words()[word].source.split(",")[0]).exists()
+    assert (proven.CONFIGS.parent / pages.words()[word].see.split(",")[0]).exists()
 
 
 def test_numbers_say_their_unit():

@@ -19,59 +19,58 @@ _WIDTH = 96
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
-    """What is explained: a word, a code, an equation or a constant. `kind` says which; `also`: other spellings.
+    """What is explained: a word of reports, a finding code, an equation or a constant; `kind` says which.
 
-    `shown` is what stands before the meaning, as it is (a formula); `examples` and `after` follow it.
+    `formula`, `wrong` and `right` are shown as they are; `also` are other spellings, `see` is where to read on.
     """
 
     kind: str
     name: str
     title: str
     meaning: str
-    source: str
+    see: str
     symbol: str = ""
-    shown: str = ""
-    examples: tuple[tuple[str, str], ...] = ()
-    after: tuple[str, ...] = ()
+    formula: str = ""
+    wrong: str = ""
+    right: str = ""
+    unit: str = ""
+    stands: str = ""
     also: tuple[str, ...] = ()
 
     def text(self) -> str:
         """The page."""
-        head = f"{self.name} ({self.symbol}): " if self.symbol else f"{self.name}: "
-        shown = [_indented(self.shown)] if self.shown else []
-        examples = (f"{name}:\n{_indented(text)}" for name, text in self.examples)
-        parts = [f"{head}{self.title}", *shown, _filled(self.meaning), *examples, *self.after]
-        return "\n\n".join([*parts, f"Source: {self.source}"])
+        parts = [
+            f"{self.name} ({self.symbol}): {self.title}" if self.symbol else f"{self.name}: {self.title}"
+        ]
+        parts += [_indented(self.formula), _filled(self.meaning)]
+        parts += [f"{name}:\n{_indented(text)}" for name, text in self.examples if text]
+        parts += [f"Unit: {self.unit}" if self.unit else "", self.stands, f"Source: {self.see}"]
+        return "\n\n".join(filter(None, parts))
+
+    @property
+    def examples(self) -> tuple[tuple[str, str], ...]:
+        """What is refused, and what is not."""
+        return ("Wrong", self.wrong), ("Right", self.right)
 
 
-def _data(name: str) -> Mapping[str, Any]:
+def _data(name: str) -> Mapping[str, dict[str, Any]]:
     return tomllib.loads((resources.files("tubecert") / "pages" / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 @cache
 def codes() -> Mapping[str, Page]:
-    """The pages of the finding codes, with what is wrong and right in an example."""
-    return {code: _of_code(code, **page) for code, page in _data("codes").items()}
-
-
-def _of_code(
-    code: str, *, title: str, meaning: str, wrong: str = "", right: str = "", command: str = "check"
-) -> Page:
-    return Page(
-        kind="code",
-        name=code,
-        title=title,
-        meaning=meaning,
-        examples=tuple(each for each in (("Wrong", wrong), ("Right", right)) if each[1]),
-        source=f"{command}, finding code {code}",
-    )
+    """The pages of the finding codes."""
+    return {
+        code: Page(kind="code", name=code, see=f"{own.pop('command', 'check')}, finding code {code}", **own)
+        for code, own in _data("codes").items()
+    }
 
 
 @cache
 def equations() -> Mapping[str, Page]:
     """The pages of the equations, by their tags."""
     pages = _data("equations").items()
-    return {tag: Page(kind="equation", name=tag, shown=page.pop("formula"), **page) for tag, page in pages}
+    return {tag: Page(kind="equation", name=tag, see=own.pop("source"), **own) for tag, own in pages}
 
 
 @cache
@@ -86,13 +85,10 @@ def constants() -> Mapping[str, Page]:
             name=name,
             symbol=own.symbol,
             title=own.words,
-            shown=data[name]["formula"],
-            meaning=data[name]["meaning"],
-            after=(
-                f"Unit: {own.unit} (x: state, u: input, d: Riemannian distance)",
-                f"In a certificate: result.constants.{name}, as [proven below, proven above]",
-            ),
-            source=f"{own.equation}; docs/theory.md, docs/equations.md",
+            unit=f"{own.unit} (x: state, u: input, d: Riemannian distance)",
+            stands=f"In a certificate: result.constants.{name}, as [proven below, proven above]",
+            see=f"{own.equation}; docs/theory/index.md, docs/equations.md",
+            **data[name],
         )
         for name, own in EVERY.items()
     }
@@ -101,16 +97,8 @@ def constants() -> Mapping[str, Page]:
 @cache
 def words() -> Mapping[str, Page]:
     """The pages of the words of reports."""
-    return {word: _of_word(word, **page) for word, page in _data("words").items()}
-
-
-def _of_word(
-    word: str, *, title: str, meaning: str, see: str, unit: str = "", also: tuple[str, ...] = ()
-) -> Page:
-    after = (f"Unit: {unit}",) if unit else ()
-    return Page(
-        kind="word", name=word, title=title, meaning=meaning, source=see, after=after, also=tuple(also)
-    )
+    pages = _data("words").items()
+    return {word: Page(kind="word", name=word, also=tuple(own.pop("also", ())), **own) for word, own in pages}
 
 
 def _spelled() -> Mapping[str, Page]:
