@@ -149,15 +149,6 @@ class Chart:
         width = {"stroke-width": f"{2 * size:.6g}"}
         ET.SubElement(group, "path", {"class": f"sweep {style}", "d": path(flat), **width})
 
-    def rule(self, value: float, style: str, *, across: bool = False) -> None:
-        """A line over the whole plot at a value of x, or of y."""
-        ends = (
-            [(self.x.low, value), (self.x.high, value)]
-            if across
-            else [(value, self.y.low), (value, self.y.high)]
-        )
-        self.line(ends, style)
-
     def dot(self, point: Point, style: str, radius: float = 4.5, words: str = "") -> None:
         """A round mark; `words` are shown by a pointer that rests on it."""
         cx, cy = self.at(point)
@@ -165,11 +156,6 @@ class Chart:
         mark = ET.SubElement(self.svg, "circle", {"class": f"dot {style}", **place})
         if words:
             ET.SubElement(mark, "title").text = words
-
-    def label(self, point: Point, words: str, style: str, shift: Point = (0.0, 0.0)) -> None:
-        """A text at a point."""
-        x, y = self.at(point)
-        text(self.svg, (x + shift[0], y + shift[1]), words, style)
 
     def text(self) -> str:
         """The SVG element."""

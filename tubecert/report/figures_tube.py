@@ -10,7 +10,6 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from tubecert.certificate.result import InputData, Result
-from tubecert.digits import near
 from tubecert.report import planned
 from tubecert.report.claimed import point
 from tubecert.report.figures_axes import Point
@@ -68,7 +67,7 @@ def _tube(result: Result, plane: Plane) -> Figure:
     chart, legend = scene(f"tube-{plane.index[0]}-{plane.index[1]}", plane, [p for p, _ in witnesses], proven)
     legend += draw_obstacles(chart, result.spec.effective.obstacles, plane.names)
     if plane.plan:
-        chart.dot(plane.plan[0], "start", words=f"start of the plan: {_pair(plane, plane.plan[0])}")
+        chart.dot(plane.plan[0], "start", words="start of the plan")
         legend.append(("start", "start of the plan" if len(plane.plan) > 1 else "the plan, an equilibrium"))
     for place, words in witnesses:
         chart.dot(place, "witness", 6, words)
@@ -130,7 +129,3 @@ def _input_band(result: Result, own: InputData | None, curve: Sequence[Point]) -
         return None
     below = own.plan.least.below - min(each.least for each in found)
     return _around(curve, below, max(each.greatest for each in found) - own.plan.greatest.above)
-
-
-def _pair(plane: Plane, value: Point) -> str:
-    return f"{plane.names[0]} = {near(value[0], 4)}, {plane.names[1]} = {near(value[1], 4)}"

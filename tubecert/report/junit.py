@@ -36,11 +36,11 @@ def _suite(root: ET.Element, result: Checked) -> ET.Element:
     cases = [_part(suite, result, prefix, name) for prefix, name in PARTS.items()]
     failed = any(item.code.startswith("TC5") and item.severity is Severity.ERROR for item in result.findings)
     cases += [_claim(suite, result, claim, failed=failed) for claim in result.claims]
-    suite.set("tests", str(len(cases)))
-    suite.set("failures", str(sum(case.find("failure") is not None for case in cases)))
-    suite.set("errors", "0")
-    suite.set("skipped", "0")
-    suite.set("time", f"{result.seconds:.3f}")
+    failures = sum(case.find("failure") is not None for case in cases)
+    counts = {"tests": len(cases), "failures": failures, "errors": 0, "skipped": 0}
+    suite.attrib.update(
+        {key: str(count) for key, count in counts.items()} | {"time": f"{result.seconds:.3f}"}
+    )
     return suite
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -25,22 +26,16 @@ def render(results: Sequence[Checked]) -> str:
     findings = [item for result in results for item in result.findings]
     used = sorted({item.code for item in findings})
     run = {
-        "tool": {"driver": _driver(used)},
+        "tool": {
+            "driver": {"name": "tubecert", "semanticVersion": __version__, "rules": [*map(_rule, used)]}
+        },
         "invocations": [{"executionSuccessful": True}],
         "columnKind": "unicodeCodePoints",
         "artifacts": [{"location": _artifact(result.path)} for result in results],
-        "results": _results(findings, used),
+        "results": list(_results(findings, used)),
     }
     log = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
     return printable_json(json.dumps(log, indent=1, ensure_ascii=False)) + "\n"
-
-
-def _driver(used: Sequence[str]) -> dict[str, Any]:
-    return {
-        "name": "tubecert",
-        "semanticVersion": __version__,
-        "rules": [_rule(code) for code in used],
-    }
 
 
 def _rule(code: str) -> dict[str, Any]:
@@ -54,26 +49,20 @@ def _rule(code: str) -> dict[str, Any]:
     }
 
 
-def _results(findings: Sequence[Finding], used: Sequence[str]) -> list[dict[str, Any]]:
-    seen: dict[str, int] = {}
-    results = []
+def _results(findings: Sequence[Finding], used: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Each with a fingerprint of its code and line, numbered where lines are alike."""
+    seen = Counter[str]()
     for item in findings:
-        text = item.message + (f"\nhelp: {item.help}" if item.help else "")
-        result: dict[str, Any] = {
-            "ruleId": item.code,
-            "ruleIndex": used.index(item.code),
-            "level": _LEVELS[item.severity],
-            "message": {"text": text},
-        }
-        if item.location is not None:
-            result["locations"] = [{"physicalLocation": _place(item.location)}]
-            line = hashlib.sha256(
-                f"{item.code} {item.location.source.strip()}".encode("utf-8", "backslashreplace")
-            ).hexdigest()[:16]
-            seen[line] = seen.get(line, 0) + 1
-            result["partialFingerprints"] = {"primaryLocationLineHash": f"{line}:{seen[line]}"}
-        results.append(result)
-    return results
+        text, place = item.message + (f"\nhelp: {item.help}" if item.help else ""), item.location
+        result: dict[str, Any] = {"ruleId": item.code, "ruleIndex": used.index(item.code)}
+        result |= {"level": _LEVELS[item.severity], "message": {"text": text}}
+        if place is not None:
+            line = f"{item.code} {place.source.strip()}".encode("utf-8", "backslashreplace")
+            mark = hashlib.sha256(line).hexdigest()[:16]
+            seen[mark] += 1
+            result["locations"] = [{"physicalLocation": _place(place)}]
+            result["partialFingerprints"] = {"primaryLocationLineHash": f"{mark}:{seen[mark]}"}
+        yield result
 
 
 def _place(location: Location) -> dict[str, Any]:

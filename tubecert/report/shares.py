@@ -101,11 +101,14 @@ def _numbers(result: Result) -> Numbers[Interval] | None:
     """The constants of a certificate on the side that its theorems use; None where one is missing."""
     known = {symbol: _constant(result, name) for symbol, name in FIELDS.items()}
     named = {symbol: value for symbol, value in known.items() if value is not None}
-    if len(named) != len(known) or result.metric is None or result.tube is None:
+    tube, wind = result.tube, result.claim.wind
+    if len(named) != len(known) or result.metric is None or tube is None:
         return None
-    tube = result.tube
-    wind = result.claim.wind
-    size = None if wind is None else Interval.of(Fraction(wind.bound))
+
+    def blown(name: str) -> Interval | None:
+        value = _constant(result, name)
+        return None if value is None or wind is None else value * Interval.of(Fraction(wind.bound))
+
     return Numbers(
         **named,
         R=Interval.of(0),
@@ -114,15 +117,11 @@ def _numbers(result: Result) -> Numbers[Interval] | None:
         rho_a=Interval.of(tube.rho_a),
         rho_r=Interval.of(tube.rho - tube.rho_a),
         horizon=None,
-        wind_push=_times(_constant(result, "wind_push"), size),
-        wind_speed=_times(_constant(result, "wind_size"), size),
-        wind_error=_times(_constant(result, "wind_explained"), size),
+        wind_push=blown("wind_push"),
+        wind_speed=blown("wind_size"),
+        wind_error=blown("wind_explained"),
         rest_speed=_constant(result, "residual_size"),
     )
-
-
-def _times(value: Interval | None, size: Interval | None) -> Interval | None:
-    return None if value is None or size is None else value * size
 
 
 def _constant(result: Result, name: str) -> Interval | None:
