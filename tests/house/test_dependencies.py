@@ -18,7 +18,6 @@ from tubecert.cli.app import app
 from tubecert.spec import load
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-IF_INSTALLED = {"pyarrow"}  # used if it is there (sweep --parquet), and no dependency
 MODULE_OF = {"pyyaml": "yaml", "python-flint": "flint"}
 
 
@@ -48,7 +47,7 @@ def test_every_dependency_is_said_to_decide_or_to_show():
 def test_dependencies_are_what_is_imported():
     found = frozenset().union(*map(libraries_of, MODULES))
     foreign = found - set(sys.stdlib_module_names) - {"tubecert"}
-    assert foreign - IF_INSTALLED == {MODULE_OF.get(name, name) for name in needed()}
+    assert foreign == {MODULE_OF.get(name, name) for name in needed()}
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from tubecert.errors import SpecError, TargetError
 from tubecert.executor import Cluster, Serial, WorkerError
 from tubecert.pipeline import Options
 from tubecert.report.figures_sweep import sweep_figures
-from tubecert.report.sweep import SweepTable, can_write_parquet
+from tubecert.report.sweep import SweepTable
 from tubecert.spec import Setting
 from tubecert.sweep.grid import Axis
 from tubecert.sweep.point import Task, memory_of
@@ -273,23 +273,6 @@ def test_the_folder_holds_a_page_and_drawings_that_can_be_opened(done, tmp_path)
         assert ET.fromstring(path.read_text(encoding="utf-8")).tag == "{http://www.w3.org/2000/svg}svg"
     page = (tmp_path / "out/sweep.html").read_text(encoding="utf-8")
     assert page.count("<svg viewBox") >= len(drawings)
-
-
-@pytest.mark.slow
-def test_parquet_says_what_it_needs(done, tmp_path):
-    answer = run("sweep", done[0], *OVER, "-o", copied(done, tmp_path), "--parquet")
-    if not can_write_parquet():
-        assert (answer.exit_code, "needs pyarrow" in answer.output) == (2, True)
-        return
-    from pyarrow import parquet
-
-    table = parquet.read_table(tmp_path / "out/table.parquet")
-    rows = rows_of(done[1])
-    assert table.column_names == list(rows[0])
-    assert table["verdict"].to_pylist() == [row["verdict"] for row in rows]
-    assert table["tube.epsilon"].to_pylist() == [0.2, 0.4, 1.2, -1.0]
-    assert table["rho"].to_pylist()[:2] == [float(row["rho"]) for row in rows[:2]]
-    assert table["rho"].to_pylist()[3] is None
 
 
 @pytest.mark.parametrize(

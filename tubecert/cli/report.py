@@ -19,17 +19,21 @@ Examples:
   tubecert report plant.certificate.json
   tubecert report plant.certificate.json -o plant.html -o plant.md
   tubecert report plant.certificate.json --simulation plant.simulation
+  tubecert report plant.certificate.json --figures plant.figures
 """
 _FILES: Final = "The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]"
 _WORDS: Final = {
     "certificate": CERTIFICATE,
     "output": Text(_FILES, "FILE", short="-o", many=True),
+    "figures": Text("Every figure as a file, for a paper: SVG, PDF, PNG, captions.", "FOLDER"),
     **words_of(pages.report),
 }
 
 
 @command(_WORDS, short="Make a page from a certificate.", after=_AFTER)
-def report(how: Output, certificate: str, *, output: Sequence[str] = (), **asked: Any) -> None:
+def report(
+    how: Output, certificate: str, *, output: Sequence[str] = (), figures: str | None = None, **asked: Any
+) -> None:
     """Make a page from a certificate, without certifying anything again."""
     from tubecert.cli.guard import write_stdout
     from tubecert.cli.telling import refused
@@ -45,10 +49,13 @@ def report(how: Output, certificate: str, *, output: Sequence[str] = (), **asked
     page = pages.report(read(certificate), **asked)
     for target in targets:
         page.save(target)
+    drawn = [] if figures is None else page.save_figures(figures)
     if how.json:
         write_stdout(printable_json(json.dumps({"pages": targets}, ensure_ascii=False)) + "\n")
     elif not how.quiet:
-        write_stdout("".join(f"page {visible(target)}\n" for target in targets) + f"{NOT_RECHECKED}\n")
+        rows = [f"page {visible(target)}\n" for target in targets]
+        rows += [f"figures {visible(figures)}: {len(drawn)} files\n"] if figures is not None else []
+        write_stdout("".join([*rows, f"{NOT_RECHECKED}\n"]))
 
 
 def check_pages(targets: Sequence[str], taken: Mapping[str, str | None]) -> None:

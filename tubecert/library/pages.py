@@ -60,7 +60,7 @@ class Report:
     def save_figures(self, folder: File) -> list[str]:
         """Write every figure into a folder, as SVG, PDF and PNG, and what they show as captions.md; their names.
 
-        PDF and PNG need matplotlib (the extra `simulate`). Raises `TargetError`.
+        PDF and PNG need matplotlib (the extra `simulate`), without which there are none. Raises `TargetError`.
         """
         from importlib.util import find_spec
 
@@ -74,6 +74,7 @@ class Report:
             data |= {
                 f"{each.key}.{ending}": painted(ending, each) for each in told for ending in ("pdf", "png")
             }
+        os.makedirs(folder, exist_ok=True)
         data["captions.md"] = "".join(f"- {each.key}: {each.told}\n" for each in told).encode()
         for name, content in data.items():
             write_bytes(os.path.join(os.fspath(folder), name), content, REMEDY)

@@ -13,7 +13,6 @@ from tubecert.asking import (
     METRIC,
     Choice,
     Exact,
-    Flag,
     Number,
     Text,
     exact,
@@ -149,7 +148,6 @@ class Swept(Shown):
     "budget": BUDGET,
     "jobs": Exact("Points certified at a time.", whole=True),
     "scheduler": Text(SCHEDULER.help, SCHEDULER.metavar),
-    "parquet": Flag("The table as Parquet, too; needs pyarrow, which is no part of tubecert."),
 })  # fmt: skip
 def sweep(
     spec: Specifiable,
@@ -163,7 +161,6 @@ def sweep(
     budget: int | None = None,
     jobs: int = 1,
     scheduler: str | None = None,
-    parquet: bool = False,
     progress: Progress | None = None,
 ) -> Swept:
     """Certify a specification with every combination of values of some keys: `tubecert sweep`.
@@ -180,7 +177,7 @@ def sweep(
     from tubecert.library.workers import cluster_at
     from tubecert.pipeline import Options
     from tubecert.report.progress import timed
-    from tubecert.report.sweep import SweepTable, can_write_parquet
+    from tubecert.report.sweep import SweepTable
     from tubecert.sweep.point import Task
     from tubecert.sweep.run import Sweep
 
@@ -188,9 +185,6 @@ def sweep(
     source, own = source_of(spec)
     fixed = (*settings_in(own), *settings_of(settings))
     require_once(fixed)
-    if parquet and not can_write_parquet():
-        message, help = "a table in Parquet needs pyarrow", "pip install pyarrow, or read table.csv"
-        raise SpecError([Finding(code="TC122", message=message, help=help)])
     cluster = None if scheduler is None else cluster_at(scheduler)
     place, usual = Path(folder), Options()
     task = Task(
@@ -213,7 +207,7 @@ def sweep(
     whole.run(cluster or chosen(jobs, len(whole.points)), timed(progress))
     name = whole.first().name if task.path == NAME else Path(task.path).stem
     table = SweepTable.of(name, axes, whole.outcomes())
-    return Swept(table=table, folder=task.folder, files=_written(task.folder, table, parquet=parquet))
+    return Swept(table=table, folder=task.folder, files=_written(task.folder, table))
 
 
 def _axes(over: Mapping[str, Range] | Iterable[str]) -> list[Axis]:
@@ -237,25 +231,22 @@ def _axes(over: Mapping[str, Range] | Iterable[str]) -> list[Axis]:
     return axes
 
 
-def _written(folder: Path, table: SweepTable, *, parquet: bool) -> tuple[str, ...]:
+def _written(folder: Path, table: SweepTable) -> tuple[str, ...]:
     """Write table, page and figures; their names. Raises `TargetError`."""
     from tubecert import certificate
-    from tubecert.files import replace
     from tubecert.report.figures_file import svg_file
     from tubecert.report.figures_sweep import sweep_figures, with_figures
     from tubecert.report.html import render_page
     from tubecert.report.sweep import page_of
 
     texts = {"table.csv": table.csv()}
-    if parquet:
-        replace(folder / "table.parquet", table.parquet())
     drawn = sweep_figures(table)
     texts["sweep.html"] = render_page(with_figures(page_of(table), drawn))
     for figure in drawn:
         texts[f"figures/{figure.key.removeprefix('sweep-')}.svg"] = svg_file(figure)
     for name, text in texts.items():
         certificate.write_text(str(folder / name), text, REMEDY)
-    return (*texts, *(["table.parquet"] if parquet else []))
+    return tuple(texts)
 
 
 def _require_paths(sweep: Sweep) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import csv
-import importlib.util
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO, StringIO
+from io import StringIO
 from typing import TYPE_CHECKING, Final
 
 from tubecert.digits import exact, up
@@ -128,22 +127,6 @@ class SweepTable:
             )
         return text.getvalue()
 
-    def parquet(self) -> bytes:
-        """As Parquet, with numbers as floats; needs pyarrow."""
-        import pyarrow  # type: ignore[import-not-found,import-untyped,unused-ignore]
-        import pyarrow.parquet  # type: ignore[import-not-found,import-untyped,unused-ignore]
-
-        columns = list(zip(*self.cells(), strict=True))
-        data = {
-            name: pyarrow.array(_told(values, axis))
-            for name, values, axis in zip(
-                self.header, columns, [*self.axes, *[None] * (len(columns) - len(self.axes))], strict=True
-            )
-        }
-        target = BytesIO()
-        pyarrow.parquet.write_table(pyarrow.table(data), target, compression="snappy")
-        return target.getvalue()
-
 
 def _lacking(outcome: Certificate | SampledCertificate) -> str:
     """What is not proven, in words."""
@@ -160,19 +143,6 @@ def _found(outcome: Certificate | SampledCertificate) -> str:
         told = (", ".join(f"{name} {size(width)}" for name, width in own.items()) for own in (proven, *later))
         return "; in the long run ".join(told)
     return "; ".join(row.text() for row in deciding(outcome.result))
-
-
-def can_write_parquet() -> bool:
-    """Whether pyarrow is installed, which is no part of tubecert."""
-    return importlib.util.find_spec("pyarrow") is not None
-
-
-def _told(values: Sequence[Value], axis: Axis | None) -> list[float | str | None]:
-    """A column: words as they are, numbers as floats; swept keys are numbers where all are."""
-    if axis is not None and axis.numbers is not None:
-        numbers = dict(zip(axis.texts, axis.numbers, strict=True))
-        return [numbers[str(value)] for value in values]
-    return [value if value is None or isinstance(value, str) else float(value) for value in values]
 
 
 def page_of(table: SweepTable) -> Page:
