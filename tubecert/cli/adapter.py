@@ -9,9 +9,12 @@ from __future__ import annotations
 import inspect
 import shlex
 import sys
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
+from functools import cache
+from importlib.resources import files
 from typing import Annotated, Any, Final, TypeAlias
 
 import typer
@@ -64,6 +67,12 @@ OUTPUT: Final[Words] = {
 }
 
 
+@cache
+def said() -> Mapping[str, Any]:
+    """What help says beside the words of options, by commands, and hints to words that mean something else."""
+    return tomllib.loads((files("tubecert") / "pages" / "commands.toml").read_text(encoding="utf-8"))
+
+
 def _version(wanted: bool) -> None:
     if wanted:
         from tubecert.release import __version__
@@ -103,20 +112,20 @@ class Output:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """A command: what it does, its words, which of them are given together, what help says; `shared`: of `Output`."""
+    """A command: what it does, its words, which of them are given together; `shared`: of `Output`."""
 
     run: Run
     words: Words
     pairs: tuple[tuple[str, str], ...]
-    short: str
-    after: str
     shared: Words
 
-    def add(self, app: typer.Typer, name: str) -> None:
-        """Makes it a command of the app."""
+    def add(self, app: typer.Typer) -> None:
+        """Makes it a command of the app, by its name."""
+        name = self.run.__name__
+        own = said()["commands"][name]
         made = with_options(self._ask, {**self.words, **self.shared}, version="quiet" in self.shared)
         made.__doc__ = self.run.__doc__
-        app.command(name, epilog=self.after, short_help=self.short)(made)
+        app.command(name, epilog=own["after"], short_help=own["short"])(made)
 
     def _ask(self, context: typer.Context, **texts: Any) -> None:
         how = Output.of(context, {name: texts.pop(name) for name in self.shared})
@@ -131,7 +140,7 @@ class Command:
 
 
 def command(
-    words: Words, *pairs: tuple[str, str], short: str, after: str, shared: Sequence[str] = tuple(OUTPUT)
+    words: Words, *pairs: tuple[str, str], shared: Sequence[str] = tuple(OUTPUT)
 ) -> Callable[[Run], Command]:
     """A function `run(how, **asked)` as a command; what its signature does not name has a default in its word."""
 
@@ -144,7 +153,7 @@ def command(
             for name, kind in words.items()
         }
         options = {name: OUTPUT[name] for name in shared}
-        return Command(run=run, words=kinds, pairs=pairs, short=short, after=after, shared=options)
+        return Command(run=run, words=kinds, pairs=pairs, shared=options)
 
     return made
 

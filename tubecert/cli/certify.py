@@ -22,15 +22,6 @@ if TYPE_CHECKING:
     from tubecert.spec import Setting, Spec
 
 _OF_SEARCH: Final = Fraction(1, 2)  # of the time that is given: the certification has the rest
-_AFTER = """\b
-Examples:
-  tubecert certify plant.yaml
-  tubecert certify plant.yaml --rho-a 0.05 --conditions all -o plant.json
-  tubecert certify plant.yaml --set tube.epsilon=0.3 --set system.parameters.m=0.5
-  tubecert certify plant.yaml --bandwidth 50 --adaptation-rate 2e7
-  tubecert certify plant.yaml --report plant.html
-  tubecert certify plant.yaml -q -o - | jq .result.tube
-"""
 _WORDS: Final = {
     "spec": SPEC,
     "set_": SET,
@@ -40,7 +31,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, certifying.PAIR, short="Prove the tube, find the smallest gains.", after=_AFTER)
+@command(_WORDS, certifying.PAIR)
 def certify(
     how: Output,
     spec: str,

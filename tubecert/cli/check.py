@@ -20,17 +20,6 @@ if TYPE_CHECKING:
     from tubecert.report.terminal import Terminal
     from tubecert.spec import Setting, Spec
 
-_AFTER = """\b
-Examples:
-  tubecert check plant.yaml
-  tubecert check configs/ other.yaml --strict
-  tubecert check configs/ --certify --jobs 4 --format junit > report.xml
-
-\b
-In a workflow of GitHub (GITHUB_ACTIONS=true) findings become annotations, and a summary of the step.
-Exit codes: 0 nothing to complain about; 1 errors in the mathematics, or not as expected; 2 invalid
-files; 4 undecided.
-"""
 _SUFFIXES = {".yaml", ".yml"}
 _OF_SPECIFICATIONS = rb"""(?m)^\s*\{?\s*["']?(tubecert|safe_set)["']?\s*:"""
 _SHOWN = 5
@@ -53,7 +42,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, short="Check specifications, for you and for CI.", after=_AFTER)
+@command(_WORDS)
 def check(
     how: Output,
     specs: Sequence[str],

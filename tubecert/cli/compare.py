@@ -9,16 +9,6 @@ from typing import Final
 from tubecert.asking import Choice, Text, refuse
 from tubecert.cli.adapter import CERTIFICATE, Output, command
 
-_AFTER = """\b
-Examples:
-  tubecert compare before.certificate.json after.certificate.json
-  tubecert compare old.json new.json --format markdown > comment.md
-  tubecert compare study.sweep/points/*.certificate.json --format csv
-  tubecert compare a.json b.json c.json -o page.html
-
-\b
-Exit codes: 0 the certificates were compared, whatever they say; 2 one of them cannot be read.
-"""
 _FILES = "A page or a table: FILE.html (with figures), FILE.md, FILE.csv or FILE.json; may be repeated."
 _WORDS: Final = {
     "certificates": replace(CERTIFICATE, help="Certificates, two or more.", metavar="CERT...", many=True),
@@ -29,7 +19,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, short="Put certificates side by side.", after=_AFTER)
+@command(_WORDS)
 def compare(
     how: Output, certificates: Sequence[str], *, format_: str = "text", output: Sequence[str] = ()
 ) -> None:

@@ -9,16 +9,10 @@ from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.errors import SpecError
 
-_AFTER = """\b
-Examples:
-  tubecert explain TC302
-  tubecert explain feedback_gain
-  tubecert explain 26c
-"""
 _TOPIC = Text("A code, a constant or an equation.", "TOPIC", place=True, optional=True)
 
 
-@command({"topic": _TOPIC}, short="Explain a code, a constant, an equation.", after=_AFTER, shared=("debug",))
+@command({"topic": _TOPIC}, shared=("debug",))
 def explain(how: Output, topic: str | None = None) -> None:
     """Explain a finding code, a constant or an equation; without a topic, list all that there are."""
     from tubecert.expression import near

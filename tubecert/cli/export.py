@@ -7,23 +7,13 @@ from dataclasses import replace
 from tubecert.asking import Text
 from tubecert.cli.adapter import CERTIFICATE, Output, command
 
-_AFTER = """\b
-Examples:
-  tubecert export plant.certificate.json -o controller
-  cd controller && cc -std=c99 -O2 controller.c selftest.c -o selftest -lm && ./selftest
-  tubecert recheck plant.certificate.json --controller controller
-
-\b
-Exit codes: 0 written; 2 no certificate of a sampled loop, no controller in it, or a folder with files that tubecert
-did not write or that were changed; 1 the certificate says refuted, 4 it says undecided: nothing is written.
-"""
 _WORDS = {
     "certificate": replace(CERTIFICATE, help="A certificate (JSON) of a sampled loop."),
     "output": Text("Where to.  [CERT's stem.controller]", "FOLDER", short="-o"),
 }
 
 
-@command(_WORDS, short="Write the controller of a certificate in C.", after=_AFTER)
+@command(_WORDS)
 def export(how: Output, certificate: str, *, output: str | None = None) -> None:
     """Write the controller that a certificate of a sampled loop is about: C99, with its data and a self-test."""
     from tubecert.cli.guard import write_stdout

@@ -6,7 +6,7 @@ import contextlib
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import typer
@@ -72,14 +72,14 @@ def refuse_usage(error: Any) -> int:
 
 def usage_hint(error: Exception, words: Sequence[str]) -> str:
     """What may have been meant by a command line that is refused, as a line; empty if nothing is known."""
+    from tubecert.cli.adapter import said
+
     option = str(getattr(error, "option_name", ""))
     for word in words if len(option) == 2 else ():
         if word.startswith(option) and len(word) > 2 and word[1:].split("=")[0].replace("-", "").isalpha():
             return f"  {word} is read as single letters; options of several begin with two dashes: -{word}\n"
-    if words and words[0] in _GONE:
-        return f"  {_GONE[words[0]]}\n"
-    if option in _OTHER_OPTIONS:
-        return f"  {_OTHER_OPTIONS[option]}\n"
+    if known := said()["gone"].get(words[0] if words else "") or said()["options"].get(option):
+        return f"  {known}\n"
     message = str(getattr(error, "message", ""))
     if not option and "unexpected" in message and (unit := _UNIT.search(message)):
         return f"  a number has no unit: leave {unit[1]} out; times are in s, rates in 1/s, --bandwidth in rad/s\n"
@@ -89,36 +89,6 @@ def usage_hint(error: Exception, words: Sequence[str]) -> str:
 
 
 _UNIT: Final = re.compile(r"\) \((rad/s|1/s|Hz|kHz|s|ms|m|rad|deg|sec)\)")
-_GONE: Final[Mapping[str, str]] = {
-    "design": "the narrowest tube for a machine is withdrawn until the sampled loop has a certificate of its own; "
-    "tubecert sweep tries widths, e.g. --over tube.half_widths.x1=0.1:0.5:5",
-}
-"""Commands that there once were."""
-
-_OTHER_OPTIONS: Final[Mapping[str, str]] = {
-    **dict.fromkeys(
-        ("--omega", "--bw"), "omega is --bandwidth, in rad/s; it is given together with --adaptation-rate"
-    ),
-    **dict.fromkeys(
-        ("--Gamma", "--gamma"), "Gamma is --adaptation-rate; it is given together with --bandwidth"
-    ),
-    **dict.fromkeys(("--rho", "--rho_a", "--rhoa"), "the radius left to the adaptation is --rho-a"),
-    **dict.fromkeys(("--eps",), "the radius beyond the initial offset is --epsilon"),
-    **dict.fromkeys(("--out", "--json-out"), "the certificate's file is --output FILE, or -o FILE"),
-    "--formulas": "the paper's formulas as printed are in benchmarks/published.py; certify has the corrected ones",
-    **dict.fromkeys(
-        ("--control-rate", "--sample-time"), "the loop of certificate B acts in continuous time: leave it out"
-    ),
-    **dict.fromkeys(
-        ("--rate", "--lambda"), "the rate belongs to the metric: metric.rate, or tubecert synth --rate"
-    ),
-    **dict.fromkeys(
-        ("--sweep",),
-        "a table of metrics over rates is --table; tubecert sweep goes through ranges of any key of the specification",
-    ),
-    **dict.fromkeys(("--x0",), "the start is initial_state in the specification"),
-}
-"""Names that options have in the literature or elsewhere."""
 
 
 def write_stdout(text: str) -> None:

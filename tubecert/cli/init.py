@@ -10,10 +10,6 @@ from tubecert.cli.adapter import Output, command
 from tubecert.errors import TargetError
 
 _BESIDE: Final = {"csv": ("plan.csv",)}  # files that a template needs beside it
-_AFTER = """\b
-Example:
-  tubecert init plant.yaml --template tracking && tubecert certify plant.yaml
-"""
 TEMPLATES: Final = (
     "regulation", "tracking", "machine", "pvtol", "car", "crane", "arm2", "quadrotor", "csv",
 )  # fmt: skip
@@ -25,7 +21,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, short="Write a specification to start from.", after=_AFTER, shared=("debug",))
+@command(_WORDS, shared=("debug",))
 def init(
     how: Output,
     file: str | None = None,

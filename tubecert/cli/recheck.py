@@ -17,24 +17,13 @@ if TYPE_CHECKING:
     from tubecert.library.rechecking import Rechecked
     from tubecert.recheck.run import Examined
 
-_AFTER = """\b
-Examples:
-  tubecert recheck plant.certificate.json
-  tubecert recheck plant.certificate.json --spec plant.yaml
-  tubecert recheck plant.certificate.json --controller plant.controller
-  tubecert recheck plant.certificate.json --json | jq .first_failing
-
-\b
-Exit codes: 0 certified, and every claim confirmed; 1 a claim is contradicted, or it says refuted; 2 no
-certificate, or one of another specification; 4 a claim could not be decided, or it says undecided.
-"""
 _WORDS: Final = {
     "certificate": replace(CERTIFICATE, help="A certificate (JSON); - is stdin."),
     **words_of(rechecking.recheck),
 }
 
 
-@command(_WORDS, short="Verify a certificate in a second arithmetic.", after=_AFTER)
+@command(_WORDS)
 def recheck(how: Output, certificate: str, **asked: Any) -> ExitCode:
     """Verify every claim of a certificate again: in ball arithmetic, with derivatives of its own, without a solver."""
     if seconds := asked.get("deadline"):

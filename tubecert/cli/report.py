@@ -14,13 +14,6 @@ from tubecert.library import pages
 if TYPE_CHECKING:
     from tubecert.report.quantities import AnyCertificate
 
-_AFTER = """\b
-Examples:
-  tubecert report plant.certificate.json
-  tubecert report plant.certificate.json -o plant.html -o plant.md
-  tubecert report plant.certificate.json --simulation plant.simulation
-  tubecert report plant.certificate.json --figures plant.figures
-"""
 _FILES: Final = "The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]"
 _WORDS: Final = {
     "certificate": CERTIFICATE,
@@ -30,7 +23,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, short="Make a page from a certificate.", after=_AFTER)
+@command(_WORDS)
 def report(
     how: Output, certificate: str, *, output: Sequence[str] = (), figures: str | None = None, **asked: Any
 ) -> None:

@@ -21,18 +21,6 @@ if TYPE_CHECKING:
     from tubecert.progress import Progress
     from tubecert.spec import Setting, Spec
 
-_AFTER = """\b
-Examples:
-  tubecert simulate plant.yaml
-  tubecert simulate plant.yaml --certificate plant.certificate.json --runs 1000 -o plant.runs
-  tubecert simulate plant.yaml --controllers ccm,reference,l1
-  tubecert simulate plant.yaml --bandwidth 20 --adaptation-rate 1e5
-  tubecert simulate family.yaml --certificate family.certificate.json --members 1000 --runs 4000
-
-\b
-Exit codes: 0 nothing was falsified (which proves nothing); 1 a promise is broken, or a loop that adapts
-left the tube; 2 invalid input; 4 no result, or no tube to leave; 130 interrupted, what was finished is kept.
-"""
 _CODES: Final = {
     "falsified": ExitCode.NOT_CERTIFIED,
     "tube left": ExitCode.NOT_CERTIFIED,
@@ -60,7 +48,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, short="Integrate the closed loops, try to break the certificate.", after=_AFTER)
+@command(_WORDS)
 def simulate(
     how: Output,
     spec: str,

@@ -18,21 +18,6 @@ if TYPE_CHECKING:
     from tubecert.spec import Setting
 
 _PAGE: Final = "sweep.html"
-_AFTER = """\b
-Examples:
-  tubecert sweep plant.yaml --over tube.epsilon=.1:.6:6
-  tubecert sweep plant.yaml --over tube.epsilon=.1:.6:6 --over metric.rate=.5:2:log5 --jobs 4
-  tubecert sweep plant.yaml --over conditions.decides=0,A,B --set tube.rho_a=0.2 -o study
-
-\b
-A range is FIRST:LAST:COUNT (equal steps), FIRST:LAST:logCOUNT (equal factors), or VALUE,VALUE,...; several
-make a grid. Every point is certified as tubecert certify --set ... does it, and kept in a file of its own:
-the same command goes on with a sweep that was interrupted. docs/sweep.md says what the folder holds.
-
-\b
-Exit codes: 0 every point has its row, whatever its verdict; 2 invalid input, or no point has a valid
-specification; 3 an internal error at a point (its row says so); 130 interrupted.
-"""
 _WORDS: Final = {
     "spec": SPEC,
     "over": Text("A key and its values; may be repeated.", "KEY=RANGE", many=True),
@@ -43,7 +28,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, short="Certify a grid of keys: table, curves, heat maps.", after=_AFTER)
+@command(_WORDS)
 def sweep(
     how: Output,
     spec: str,

@@ -19,21 +19,6 @@ if TYPE_CHECKING:
     from tubecert.report.text import Rows
     from tubecert.spec import Setting, Spec
 
-_AFTER = """\b
-Examples:
-  tubecert synth plant.yaml
-  tubecert synth plant.yaml --rate 0.8 -o metric.json
-  tubecert synth plant.yaml --objective adaptation --plot rates.svg
-  tubecert synth plant.yaml --rate 0.8 --solver cvxpy:MOSEK
-  tubecert certify plant.yaml --metric metric.json
-
-\b
-A file without uncertainty or trajectory will do where a rate is asked for: nothing is certified with it then.
-
-\b
-Exit codes: 0 a metric was proven and written; 1 no metric has the rate (the report says why); 2 invalid
-input; 4 none was found, or none certifies (the report says what was tried and what would help).
-"""
 _WORDS: Final = {
     "spec": SPEC,
     "set_": SET,
@@ -43,7 +28,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, short="Find a metric and prove it.", after=_AFTER)
+@command(_WORDS)
 def synth(
     how: Output,
     spec: str,

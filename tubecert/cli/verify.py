@@ -18,21 +18,6 @@ if TYPE_CHECKING:
     from tubecert.report.terminal import Terminal
     from tubecert.spec import Setting, Spec
 
-_AFTER = """\b
-Examples:
-  tubecert verify plant.yaml
-  tubecert verify plant.yaml metric.json other.mat
-  tubecert verify published/*.yaml --json
-  tubecert verify configs/published/*.yaml --expect
-  tubecert verify plant.yaml coefficients.npz --rate 0.8 -o metric.json
-
-\b
-A file of a specification may lack all but tubecert, name, system, safe_set and metric. Metrics that follow
-it (.json, .csv, .npz, .mat) are decided for its system in place of its own. docs/verify.md has the formats.
-
-\b
-Exit codes: 0 C1-C3 hold for all of them; 1 one is refuted; 2 invalid input; 4 one could not be decided.
-"""
 _METRICS = (".json", ".csv", ".npz", ".mat")
 _WORDS: Final = {
     "files": Text("Specifications, and metrics after them.", "SPEC|METRIC...", place=True, many=True),
@@ -44,7 +29,7 @@ _WORDS: Final = {
 }
 
 
-@command(_WORDS, short="Decide metrics alone: C1-C3, largest rate.", after=_AFTER)
+@command(_WORDS)
 def verify(
     how: Output,
     files: Sequence[str],
