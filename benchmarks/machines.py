@@ -83,7 +83,7 @@ def _shares(seed: int, result: Result) -> tuple[float, float]:
         stage: Stage = max((each for each in result.tube if each.start <= k), key=lambda each: each.start)
         return float({**stage.half_widths, **stage.deviations}[name])
 
-    tables = Tables(own.F.value, own.G.value, own.M.value, own.N.value)
+    tables = Tables(own.F, own.G, own.M, own.N)
     found = met(machine, tables, proven, tuple(sorted({min(k, last) for k in SAMPLES})))
     return max(one.limit / one.proven for one in found), max(one.attained / one.proven for one in found)
 

@@ -11,7 +11,6 @@ from tubecert.expression import number_text
 from tubecert.sampled_loop.record import (
     Certificate,
     Claim,
-    HexMatrix,
     InputUse,
     Nominal,
     Notes,
@@ -52,13 +51,13 @@ def tables(z: int, seed: int = 0, n: int = 2, m: int = 1) -> Tables:
     sizes = {"F": (z, z), "G": (z, n), "M": (m, z), "N": (m, n)}
     drawn = {name: draw.uniform(-1, 1, size).astype(np.float32) for name, size in sizes.items()}
     drawn["F"] /= np.float32(2 * z + 1)  # stable
-    return Tables(**{name: HexMatrix(matrix.astype(float)) for name, matrix in drawn.items()})
+    return Tables(**{name: matrix.astype(float) for name, matrix in drawn.items()})
 
 
 def no_controller() -> Tables:
     """Tables that add nothing."""
     own = tables(0)
-    own.N.value[:] = 0
+    own.N[:] = 0
     return own
 
 
@@ -89,9 +88,7 @@ def certificate(
         "spec": source(data),
         "claim": Claim(horizon=None, afterwards=afterwards, hold=hold),
         "planned": planned,
-        "nominal": Nominal(
-            **{name: HexMatrix(np.zeros((2, size))) for name, size in (("A", 2), ("B", 1), ("E", 0))}
-        ),
+        "nominal": Nominal(**{name: np.zeros((2, size)) for name, size in (("A", 2), ("B", 1), ("E", 0))}),
         "recipe": Recipe(lags=1, cuts=((),) * (3 + z), pieces=1, panels=1, windows=1, parameters="slow"),
         "controller": tables(z) if controller is None else controller,
         "tube": tuple(

@@ -152,8 +152,8 @@ def _read(kind: Any, data: Json, path: str) -> Any:
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if origin in (Union, types.UnionType):
         return _optional(arguments, data, path)
-    if kind in _FOREIGN:
-        return _FOREIGN[kind][1](data, path)
+    if (known := _FOREIGN.get(kind) or _FOREIGN.get(origin)) is not None:
+        return known[1](data, path)
     if origin is tuple:
         return _sequence(arguments, data, path)
     if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):

@@ -30,8 +30,8 @@ def loop(trajectory=handmade.REST, lanes=1, **options):
 def feedforward(**options):
     """A controller that hands out the plan's input."""
     tables = handmade.tables(1)
-    tables.M.value[:] = 0
-    tables.N.value[:] = [[1e-30, 0]]  # some controller
+    tables.M[:] = 0
+    tables.N[:] = [[1e-30, 0]]  # some controller
     return loop(z=1, controller=tables, **options)
 
 
@@ -176,7 +176,7 @@ def test_a_family_is_handed_its_plan():
 @pytest.mark.slow
 def test_inputs_stay_in_the_range_and_a_limit_that_acts_is_told():
     big = handmade.tables(1)
-    big.N.value[:] = [[100.0, 0.0]]
+    big.N[:] = [[100.0, 0.0]]
     own = loop(controller=big, z=1)
     [x], _ = own.data.plan.at([0])
     for side, limit in ((1, Fraction("3.3")), (-1, Fraction("-3.1"))):

@@ -165,9 +165,9 @@ def says(side, document):
     )
     stages = [from_json(record.Stage, stage, "tube") for stage in own["tube"]]
     model, slow = build(spec), recipe.parameters == "slow"
-    matrices = {key: getattr(nominal, key).value for key in "ABE"}
+    matrices = {key: getattr(nominal, key) for key in "ABE"}
     loop = setting.Loop(spec=spec, model=model, plan=plan_of(spec, model), knots=None, slow=slow, **matrices)
-    return theorem.check(loop, setting.Controller.of(tables), stages, recipe).verdict.value == "certified"
+    return theorem.check(loop, tables, stages, recipe).verdict.value == "certified"
 
 
 def killer(side, package, tests, good, bad):

@@ -13,7 +13,6 @@ import tubecert as tc
 from tubecert.library.sampled import certification_of
 from tubecert.loop_design import certification
 from tubecert.sampled_loop.record import Lack
-from tubecert.sampled_loop.setting import Controller
 
 
 @pytest.fixture
@@ -117,7 +116,7 @@ def test_certify_answers_for_hardware_and_refuses_what_is_about_metrics(monkeypa
 def test_the_controller_is_the_recursion_of_the_record():
     """The tables as it defines them: delta = M zeta + N dy, zeta+ = F zeta + G dy."""
     certificate = handmade.certificate(handmade.REST, z=3)
-    controller, own = certification_of(certificate).controller(), Controller.of(certificate.result.controller)
+    controller, own = certification_of(certificate).controller(), certificate.result.controller
     zeta = np.zeros(3)
     for k, dy in enumerate(np.random.default_rng(0).normal(size=(20, 2)) / 100):
         wanted, zeta = 0.5 + own.M @ zeta + own.N @ dy, own.F @ zeta + own.G @ dy

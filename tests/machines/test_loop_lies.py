@@ -14,9 +14,9 @@ from machines import Machine, Tables, drawn, met
 
 from tubecert.loop_design.certification import ask, certify
 from tubecert.sampled_loop.record import Recipe, Stage
+from tubecert.sampled_loop.record import Tables as Controller
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Responses
-from tubecert.sampled_loop.setting import Controller
 from tubecert.sampled_loop.theorem import Boxes, Inequalities, check
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
@@ -52,7 +52,7 @@ def _proven(text: str):
     result = certify(load_text(text, "machine.yaml")).result
     assert result.verdict is Verdict.CERTIFIED, result.lacks
     own = result.controller
-    tables = Controller(own.F.value, own.G.value, own.M.value, own.N.value)
+    tables = Controller(own.F, own.G, own.M, own.N)
     return tables, result.tube, result.recipe
 
 
@@ -252,7 +252,7 @@ def test_any_recipe_bounds_what_the_worst_signals_do(seed):
     if result.verdict is not Verdict.CERTIFIED:
         pytest.skip("not certified")
     own = result.controller
-    tables = Controller(own.F.value, own.G.value, own.M.value, own.N.value)
+    tables = Controller(own.F, own.G, own.M, own.N)
     lags = max(1, int(result.recipe.lags * rng.uniform(0.3, 1.2)))
     shape = (len(result.recipe.cuts), loop.H.shape[1])
     cuts = tuple(

@@ -30,7 +30,7 @@ def proven(machine: Machine):
     if result.verdict is not Verdict.CERTIFIED:
         return None
     own = result.controller
-    tables = Tables(own.F.value, own.G.value, own.M.value, own.N.value)
+    tables = Tables(own.F, own.G, own.M, own.N)
 
     def bound(k: int, name: str) -> float:
         stage = max((each for each in result.tube if each.start <= k), key=lambda each: each.start)

@@ -18,10 +18,10 @@ from tubecert.sampled_loop import responses
 from tubecert.sampled_loop.cells import largest_jump, steepness
 from tubecert.sampled_loop.matrices import product
 from tubecert.sampled_loop.obstacles import cleared
-from tubecert.sampled_loop.record import Recipe, Stage
+from tubecert.sampled_loop.record import Recipe, Stage, Tables
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Acting, Dynamics, Responses
-from tubecert.sampled_loop.setting import Controller, Loop
+from tubecert.sampled_loop.setting import Loop
 from tubecert.sampled_loop.theorem import Boxes, Inequalities, check
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.make import plan_of
@@ -60,11 +60,11 @@ def loop_of(*, slow=False, A=((0,),), B=((1,),), E=None, **sections) -> Loop:
     )
 
 
-def controller_of(N=((-1 / TS,),), F=(), G=(), M=()) -> Controller:
+def controller_of(N=((-1 / TS,),), F=(), G=(), M=()) -> Tables:
     N = np.atleast_2d(np.array(N, dtype=float))
     (m, n), z = N.shape, len(F)
     shaped = zip((F, G, M), ((z, z), (z, n), (m, z)), strict=True)
-    return Controller(*(np.array(own, dtype=float).reshape(shape) for own, shape in shaped), N)
+    return Tables(*(np.array(own, dtype=float).reshape(shape) for own, shape in shaped), N)
 
 
 def asked(

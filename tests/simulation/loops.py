@@ -8,9 +8,9 @@ from handmade import source
 
 from tubecert.loop_design.proposal import propose
 from tubecert.model import build
-from tubecert.sampled_loop.record import Claim, HexMatrix, Nominal, Result
+from tubecert.sampled_loop.record import Claim, Nominal, Result, Tables
 from tubecert.sampled_loop.remainders import Remainders
-from tubecert.sampled_loop.setting import Controller, Loop
+from tubecert.sampled_loop.setting import Loop
 from tubecert.sampled_loop.theorem import check
 from tubecert.simulation.sampled.setting import Setting, setting_of
 from tubecert.spec import canonical, load_text
@@ -63,7 +63,7 @@ def proven(name: str) -> Result:
     spec, N = load_text(text), np.array(gain, dtype=float)
     model = build(spec)
     loop = Loop(spec=spec, model=model, plan=plan_of(spec, model), knots=None, slow=True, A=A, B=B, E=E)
-    own = Controller(np.zeros((0, 0)), np.zeros((0, len(A))), np.zeros((len(N), 0)), N)
+    own = Tables(np.zeros((0, 0)), np.zeros((0, len(A))), np.zeros((len(N), 0)), N)
     inequalities, stages = propose(Remainders(loop, 64), own)
     checked = check(loop, own, stages, inequalities.recipe)
     assert checked.verdict is Verdict.CERTIFIED, checked.lacks
@@ -71,8 +71,8 @@ def proven(name: str) -> Result:
         verdict=checked.verdict,
         spec=source(canonical(spec)),
         claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
-        nominal=Nominal(A=HexMatrix(A), B=HexMatrix(B), E=HexMatrix(E)),
-        controller=own.record(),
+        nominal=Nominal(A, B, E),
+        controller=own,
         tube=stages,
         inputs=checked.inputs,
         clearance=checked.clearance,

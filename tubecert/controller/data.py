@@ -61,7 +61,7 @@ def data_of(certificate: Certificate) -> Data:
         error = refused(f"the certificate says {result.verdict}", "tubecert report tells what is missing")
         error.exit_code = result.verdict.exit_code
         raise error
-    if tables is None or not (tables.M.value.any() or tables.N.value.any()):
+    if tables is None or not (tables.M.any() or tables.N.any()):
         raise refused("the certificate has no controller", "certify with `controller: auto`")
     spec = question(result)
     machine = spec.hardware
@@ -83,7 +83,7 @@ def data_of(certificate: Certificate) -> Data:
         real=real,
         sample_time=machine.sample_time,
         delay=machine.delayed,
-        tables={name: getattr(tables, name).value for name in "FGMN"},
+        tables={name: getattr(tables, name) for name in "FGMN"},
         limits={name: np.array([_next(q, side, real) for q in own]) for name, (side, own) in limits.items()},
         plan=planned(result, spec, machine),
     )

@@ -28,7 +28,17 @@ from tubecert.loop_design.unfound import NoDesign, refuse_unmoved
 from tubecert.model import ControlAffineModel, build
 from tubecert.planner import propose as planner
 from tubecert.progress import Phase, Progress, Step, Unit
-from tubecert.sampled_loop.record import Certificate, Claim, Lack, Notes, Result, Source, seal
+from tubecert.sampled_loop.record import (
+    Certificate,
+    Claim,
+    Lack,
+    Nominal,
+    Notes,
+    Result,
+    Source,
+    Tables,
+    seal,
+)
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.setting import Loop
 from tubecert.sampled_loop.theorem import check, undefined
@@ -103,7 +113,7 @@ def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, No
         result = replace(
             plain,
             verdict=checked.verdict,
-            controller=tables.record(),
+            controller=Tables(tables.F, tables.G, tables.M, tables.N),
             tube=stages,
             inputs=checked.inputs,
             clearance=checked.clearance,
@@ -166,5 +176,5 @@ def _result(loop: Loop) -> Result:
         ),
         claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
         planned=loop.knots,
-        nominal=loop.nominal(),
+        nominal=Nominal(loop.A, loop.B, loop.E),
     )

@@ -18,7 +18,7 @@ from tubecert.loop_design.observer import Observer, in_units, observe, rounded, 
 from tubecert.loop_design.plant import Plant
 from tubecert.loop_design.unfound import NoDesign
 from tubecert.loop_design.widths import Response, respond, rest_at, sample_of, settle, sizes
-from tubecert.sampled_loop.setting import Controller
+from tubecert.sampled_loop.record import Tables
 
 COARSE = (10.0, 3.0)  # factors on groups of weights
 FINE = (3.0, 1.7, 3.0, 1.7, 1.3)  # on groups and on single weights
@@ -36,7 +36,7 @@ UNASKED = 2.0  # times its first half-width is what a state may have for another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Design(Controller):
+class Design(Tables):
     """delta = M zeta + N dy, zeta+ = F zeta + G dy with zeta = (e, eta, v) observed, in numbers of single precision.
 
     W (n,), U (m,): the tube as floats find it. `evaluations` of the search.

@@ -15,10 +15,10 @@ import numpy as np
 from tubecert.digits import up
 from tubecert.enclosure.interval import Array
 from tubecert.loop_design.unfound import NoDesign
-from tubecert.sampled_loop.record import Recipe, Stage
+from tubecert.sampled_loop.record import Recipe, Stage, Tables
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Dynamics
-from tubecert.sampled_loop.setting import Controller, Loop
+from tubecert.sampled_loop.setting import Loop
 from tubecert.sampled_loop.theorem import MOST_LAGS, Boxes, Inequalities
 
 _FORGOTTEN: Final = 1e-4  # what is left of the oldest sample that counts
@@ -37,7 +37,7 @@ Report = Callable[[int, Array], None]
 
 
 def propose(
-    remainders: Remainders, controller: Controller, report: Report | None = None
+    remainders: Remainders, controller: Tables, report: Report | None = None
 ) -> tuple[Inequalities, tuple[Stage, ...]]:
     """Stages that should hold, with the inequalities that say so. Raises `NoDesign`."""
     loop = remainders.loop
@@ -98,7 +98,7 @@ def _in_stages(found: Inequalities) -> Inequalities | None:
     return replace(found, starts=tuple(starts))
 
 
-def _lags(loop: Loop, controller: Controller) -> int:
+def _lags(loop: Loop, controller: Tables) -> int:
     """After how many samples nothing is left of xi; all samples of a plan that ends before."""
     own = Dynamics(loop, controller)
     core = own.width - loop.H.shape[1]

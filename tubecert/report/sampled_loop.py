@@ -190,7 +190,7 @@ def _origin(certificate: Certificate) -> Facts:
     tables, evaluations = certificate.result.controller, certificate.notes.evaluations
     rows = [("hash", certificate.hash)]
     if tables is not None:
-        about = f"{len(tables.F.value)} states, the best of {evaluations} that were tried"
+        about = f"{tables.size} states, the best of {evaluations} that were tried"
         rows.append(("controller", about))
     rows += [
         (name, str(told)) for name, told in sorted(certificate.run.items()) if not isinstance(told, dict)

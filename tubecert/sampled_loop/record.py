@@ -24,21 +24,12 @@ from tubecert.verdict import Verdict
 FORMAT: Final = "tubecert-sampled-loop/1"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HexMatrix:
-    """A matrix of floats (p, q) that are exact numbers: written as hexadecimal texts, row by row."""
-
-    value: Array
+def _hex(matrix: Array) -> Json:
+    """A matrix of floats (p, q) that are exact numbers: as hexadecimal texts, row by row."""
+    return {"columns": matrix.shape[1], "rows": [[x.hex() for x in row] for row in matrix.tolist()]}
 
 
-def _hex(matrix: HexMatrix) -> Json:
-    return {
-        "columns": int(matrix.value.shape[1]),
-        "rows": [[float(x).hex() for x in row] for row in matrix.value],
-    }
-
-
-def _unhex(data: Json, path: str) -> HexMatrix:
+def _unhex(data: Json, path: str) -> Array:
     rows = data.get("rows") if isinstance(data, dict) and data.keys() == {"columns", "rows"} else None
     if not isinstance(rows, list) or not isinstance(width := data["columns"], int):
         raise FormError(path, "is not a matrix of hexadecimal numbers")
@@ -49,32 +40,37 @@ def _unhex(data: Json, path: str) -> HexMatrix:
     value = value.reshape(len(rows), -1) if rows and width else np.zeros((len(rows), width))
     if value.shape != (len(rows), width) or not np.isfinite(value).all():
         raise FormError(path, "is not a matrix of finite numbers")
-    return HexMatrix(value)
+    return value
 
 
-foreign(HexMatrix, _hex, _unhex)
+foreign(np.ndarray, _hex, _unhex)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Tables:
     """The controller: delta = M zeta + N dy, zeta+ = F zeta + G dy, with dy = y - x*(t_k) and zeta(0) = 0.
 
     Shapes: F (z, z), G (z, n), M (m, z), N (m, n); entries are numbers of single precision. z = 0 with N = 0: none.
     """
 
-    F: HexMatrix
-    G: HexMatrix
-    M: HexMatrix
-    N: HexMatrix
+    F: Array
+    G: Array
+    M: Array
+    N: Array
+
+    @property
+    def size(self) -> int:
+        """z, the entries of its state."""
+        return len(self.F)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Nominal:
     """The matrices of the error equation, any floats: A (n, n), B (n, m), E (n, k) of the disturbance."""
 
-    A: HexMatrix
-    B: HexMatrix
-    E: HexMatrix
+    A: Array
+    B: Array
+    E: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

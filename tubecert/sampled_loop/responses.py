@@ -18,7 +18,8 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.sampled_loop.matrices import Exponential, product, stacked, total
-from tubecert.sampled_loop.setting import Controller, Loop
+from tubecert.sampled_loop.record import Tables
+from tubecert.sampled_loop.setting import Loop
 
 _AT_ONCE: Final = 400_000  # entries of a batch of rows
 
@@ -26,7 +27,7 @@ _AT_ONCE: Final = 400_000  # entries of a batch of rows
 class Dynamics:
     """The loop from sample to sample, and within one: rows of (xi, heard), of `width` and n + m + z columns."""
 
-    def __init__(self, loop: Loop, controller: Controller) -> None:
+    def __init__(self, loop: Loop, controller: Tables) -> None:
         self.loop, self.exponential, c = loop, Exponential(loop.A), controller
         n, m, z, past = loop.states, loop.inputs, c.size, loop.whole + 1
         ends = [0, *accumulate([n, z, *[m] * past, loop.H.shape[1], n, m, z])]
@@ -117,7 +118,7 @@ class Responses:
     what acts within the sample up to a node; `pieces` (.., n, ..): how far e between two of them is from the chord.
     """
 
-    def __init__(self, loop: Loop, controller: Controller, *, lags: int, pieces: int, panels: int) -> None:
+    def __init__(self, loop: Loop, controller: Tables, *, lags: int, pieces: int, panels: int) -> None:
         self.loop, self.controller, self.lags = loop, controller, lags
         self.dynamics = own = Dynamics(loop, controller)
         n, self._r = loop.states, loop.H.shape[1]

@@ -25,7 +25,6 @@ from tubecert.expression import ZERO, Expression, constant, free_symbols, symbol
 from tubecert.expression.matrix import column, combine, multiply
 from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.sampled_loop.matrices import lengths, nothing, total
-from tubecert.sampled_loop.record import HexMatrix, Nominal, Tables
 from tubecert.spec import Spec
 from tubecert.spec.types import Afterwards, Hold, Knots, Vector
 from tubecert.trajectory.plan import Family, Plan
@@ -129,10 +128,6 @@ class Loop:
         self.horizon = plan.horizon if self.afterwards == "nothing" else None
         self.samples = None if self.horizon is None else ceil(self.horizon / self.sample_time)
 
-    def nominal(self) -> Nominal:
-        """A, B and E as they are written."""
-        return Nominal(**{name: HexMatrix(getattr(self, name)) for name in "ABE"})
-
     def times(self) -> Range | None:
         """The times that matter for h and the plan; None where nothing depends on t.
 
@@ -176,35 +171,3 @@ def driven(
     """f + B u, (n,)."""
     u = column([symbol(name) for name in inputs])
     return tuple(row[0] for row in combine(1, column(f), 1, multiply(B, u)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Controller:
-    """The tables as arrays: F (z, z), G (z, n), M (m, z), N (m, n)."""
-
-    F: Array
-    G: Array
-    M: Array
-    N: Array
-
-    @classmethod
-    def of(cls, tables: Tables) -> Controller:
-        """The tables of a record."""
-        return cls(tables.F.value, tables.G.value, tables.M.value, tables.N.value)
-
-    def record(self) -> Tables:
-        """The same as they are written."""
-        return Tables(**{name: HexMatrix(getattr(self, name)) for name in "FGMN"})
-
-    @property
-    def size(self) -> int:
-        """z, the entries of its state."""
-        return len(self.F)
-
-    def fits(self, loop: Loop) -> bool:
-        """Whether the shapes agree and every entry is a number of single precision."""
-        z, n, m = self.size, loop.states, loop.inputs
-        tables, shapes = (self.F, self.G, self.M, self.N), ((z, z), (z, n), (m, z), (m, n))
-        with np.errstate(all="ignore"):
-            single = all(bool((own.astype(np.float32).astype(float) == own).all()) for own in tables)
-        return single and tuple(own.shape for own in tables) == shapes

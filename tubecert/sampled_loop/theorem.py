@@ -27,10 +27,10 @@ from tubecert.model import ControlAffineModel, domain_findings, unending
 from tubecert.sampled_loop.cells import MOST
 from tubecert.sampled_loop.matrices import ROUNDED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
-from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage
+from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage, Tables
 from tubecert.sampled_loop.remainders import Remainders, Sizes
 from tubecert.sampled_loop.responses import Responses
-from tubecert.sampled_loop.setting import PLAN_ROUNDING, ROUNDING, Controller, Loop
+from tubecert.sampled_loop.setting import PLAN_ROUNDING, ROUNDING, Loop
 from tubecert.trajectory.plan import Family
 from tubecert.verdict import Verdict
 
@@ -70,7 +70,7 @@ class Inequalities:
     They are monotone in the tube.
     """
 
-    controller: Controller
+    controller: Tables
     recipe: Recipe
     starts: tuple[int, ...]
     responses: Responses
@@ -78,7 +78,7 @@ class Inequalities:
 
     @classmethod
     def made(
-        cls, remainders: Remainders, controller: Controller, recipe: Recipe, starts: Sequence[int] = (0,)
+        cls, remainders: Remainders, controller: Tables, recipe: Recipe, starts: Sequence[int] = (0,)
     ) -> Inequalities:
         """Those of the loop of `remainders`."""
         sizes = {"lags": recipe.lags, "pieces": recipe.pieces, "panels": recipe.panels}
@@ -213,7 +213,7 @@ class Checked:
     lacks: tuple[Lack, ...] = ()
 
 
-def check(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: Recipe) -> Checked:
+def check(loop: Loop, controller: Tables, stages: Sequence[Stage], recipe: Recipe) -> Checked:
     """Whether the loop keeps to the stages, for everything that the specification lets happen."""
     require_ieee()
     if not _sound(loop, controller, stages, recipe):
@@ -239,12 +239,13 @@ def check(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: R
     return Checked(verdict=verdict, inputs=inputs, clearance=clearance, lacks=tuple(lacks))
 
 
-def _sound(loop: Loop, controller: Controller, stages: Sequence[Stage], recipe: Recipe) -> bool:
+def _sound(loop: Loop, controller: Tables, stages: Sequence[Stage], recipe: Recipe) -> bool:
     """Whether everything has the form that the theorem asks for."""
     n, m, z, r = loop.states, loop.inputs, controller.size, loop.H.shape[1]
-    starts = [own.start for own in stages]
+    starts, shapes = [own.start for own in stages], {"F": (z, z), "G": (z, n), "M": (m, z), "N": (m, n)}
+    tables = [(getattr(controller, name), shape) for name, shape in shapes.items()]
     return (
-        controller.fits(loop)
+        all(own.shape == shape and (own.astype(np.float32) == own).all() for own, shape in tables)
         and loop.slow == (recipe.parameters == "slow")
         and not (isinstance(loop.plan, Family) and loop.afterwards != "nothing")
         and 1 <= recipe.lags <= MOST_LAGS

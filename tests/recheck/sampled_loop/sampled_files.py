@@ -14,7 +14,6 @@ from tubecert.model import build
 from tubecert.recheck.run import Recheck, recheck
 from tubecert.sampled_loop.record import (
     Claim,
-    HexMatrix,
     Nominal,
     Notes,
     Result,
@@ -24,7 +23,7 @@ from tubecert.sampled_loop.record import (
     seal,
 )
 from tubecert.sampled_loop.remainders import Remainders
-from tubecert.sampled_loop.setting import Controller, Loop
+from tubecert.sampled_loop.setting import Loop
 from tubecert.sampled_loop.theorem import check
 from tubecert.spec import load_text
 from tubecert.spec.canonical import canonical
@@ -113,7 +112,7 @@ def tables(N, F=(), G=(), M=()) -> Tables:
     (m, n), z = N.shape, len(F)
     shaped = ((F, (z, z)), (G, (z, n)), (M, (m, z)))
     own = [np.array(np.float32(value), dtype=float).reshape(shape) for value, shape in shaped]
-    return Tables(**{name: HexMatrix(value) for name, value in zip("FGMN", (*own, N), strict=True)})
+    return Tables(*own, N)
 
 
 @cache
@@ -124,14 +123,14 @@ def _proven(text: str, gain: tuple, slow: bool) -> str:
     A, B, E = (np.array(value, dtype=float) for value in MATRICES[spec.name])
     matrices = {"A": A.reshape(n, n), "B": B.reshape(n, m), "E": E.reshape(n, -1)}
     loop = Loop(spec=spec, model=model, plan=plan_of(spec, model), knots=None, slow=slow, **matrices)
-    inequalities, stages = propose(Remainders(loop, 64), Controller.of(own))
+    inequalities, stages = propose(Remainders(loop, 64), own)
     found = check(loop, inequalities.controller, stages, inequalities.recipe)
     data = canonical(spec)
     result = Result(
         verdict=found.verdict,
         spec=Source(effective=Effective.of(data), effective_hash=digest(data), file_hash="sha256:0"),
         claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
-        nominal=Nominal(**{name: HexMatrix(value) for name, value in matrices.items()}),
+        nominal=Nominal(**matrices),
         controller=own,
         tube=stages,
         inputs=found.inputs,

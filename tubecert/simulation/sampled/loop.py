@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
-from tubecert.sampled_loop.setting import Controller
+from tubecert.sampled_loop.record import Tables
 from tubecert.simulation.halving import Places
 from tubecert.simulation.lanes import SHARES, Found, Steps
 from tubecert.simulation.obstacles import in_plane, signed_distance
@@ -28,7 +28,7 @@ Step: TypeAlias = Callable[[Array, Array, Array], Array]
 Controllers: TypeAlias = Callable[[int], Step]  # for so many lanes
 
 
-def linear(tables: Controller, lanes: int) -> Step:
+def linear(tables: Tables, lanes: int) -> Step:
     """The tables in floats.
 
     Implements: theory of the sampled loop, section 1: delta = M zeta + N dy, zeta+ = F zeta + G dy.

@@ -17,9 +17,9 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import symbol
 from tubecert.expression.matrix import column, combine, multiply
 from tubecert.model import TIME, build
-from tubecert.sampled_loop.record import Result
+from tubecert.sampled_loop.record import Result, Tables
 from tubecert.sampled_loop.remainders import Remainders, Sizes
-from tubecert.sampled_loop.setting import Controller, Loop, Size
+from tubecert.sampled_loop.setting import Loop, Size
 from tubecert.spec import Knots, Spec
 from tubecert.trajectory.make import plan_of
 
@@ -38,7 +38,7 @@ class Setting:
 
     loop: Loop
     result: Result
-    tables: Controller
+    tables: Tables
     samples: int
     nodes: tuple[Fraction, ...]
     plant: Tape
@@ -97,14 +97,14 @@ def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> 
         plan=plan_of(spec, model, knots),
         knots=plan,
         slow=result.recipe is None or result.recipe.parameters == "slow",
-        **{name: getattr(result.nominal, name).value for name in "ABE"},
+        **{name: getattr(result.nominal, name) for name in "ABE"},
     )
     tube = [{**stage.half_widths, **stage.deviations} for stage in result.tube]
     bounds = np.array([[own[name] for name in (*spec.states, *spec.inputs)] for own in tube], dtype=float)
     return Setting(
         loop=loop,
         result=result,
-        tables=Controller.of(result.controller),
+        tables=result.controller,
         samples=_samples(loop, result, duration),
         nodes=_nodes(loop),
         plant=_plant(loop),
