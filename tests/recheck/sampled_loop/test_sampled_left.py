@@ -149,7 +149,7 @@ def test_rows_change_as_their_derivatives_say(delay):
     machine = read_sampled_specification(
         Node(json.loads(json.dumps(canonical(load_text(text)))), "spec")
     ).hardware
-    loop = Loop(A, B, H, *tables, machine.sample_time, machine.delay)
+    loop = Loop(A, B, H, tables, (machine.sample_time, machine.delay))
     assert loop.waiting == ceil(float(delay) / 0.1)
     for s, later in ((arb("0.05"), True), (arb("0.02"), not loop.rest)):
         h = arb("1e-6")

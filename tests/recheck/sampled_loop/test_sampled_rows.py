@@ -38,7 +38,7 @@ def test_an_exponential_holds_every_entry():
     """Of [0 1; 1 0]: a remainder entry by entry would leave out those that the powers so far do not reach."""
     none = {"F": arb_mat(0, 0), "G": arb_mat(0, 2), "M": arb_mat(1, 0), "N": arb_mat(1, 2)}
     A, H, times = arb_mat([[0, 1], [1, 0]]), arb_mat([[1, 0], [0, 1]]), (Fraction(1), Fraction(0))
-    loop = Loop(A, arb_mat(2, 1), H, *none.values(), *times)
+    loop = Loop(A, arb_mat(2, 1), H, [*none.values()], times)
     for t in (arb("0.4"), arb(0.4, 0.1), arb(0)):
         moved, steady = parted(loop.flow(t), 2)
         for i in (0, 1):
@@ -80,7 +80,8 @@ class Case:
             else arb_mat(*getattr(self, name).shape)
             for name in "ABHFGMN"
         }
-        loop = Loop(**named, sample=SAMPLE, delay=delay)
+        A, B, H, *tables = named.values()
+        loop = Loop(A, B, H, tables, (SAMPLE, delay))
         noise, wind = Size([*map(arb, self.noise)], length=self.length), Size([arb(self.wind)], length=False)
         eta = Slow([*map(arb, self.H[:, 0])], *map(arb, (self.size, self.rate, self.first)))
         n, z = self.n, self.z
@@ -168,9 +169,7 @@ def plain(A, E, start: list[float], wind: float) -> Inequalities:
     """e' = A e + E w from a point, nothing else; samples of 1 s, one piece, one panel, the box no larger than it."""
     n = len(A)
     nothing = {"F": arb_mat(0, 0), "G": arb_mat(0, n), "M": arb_mat(1, 0), "N": arb_mat(1, n)}
-    loop = Loop(
-        A=arb_mat(A), B=arb_mat(n, 1), H=arb_mat(n, 0), **nothing, sample=Fraction(1), delay=Fraction(0)
-    )
+    loop = Loop(arb_mat(A), arb_mat(n, 1), arb_mat(n, 0), [*nothing.values()], (Fraction(1), Fraction(0)))
     winds = [(arb_mat([[x] for x in E]), Size([arb(wind)], length=False))]
     stage, noise = Stage(0, (Fraction(1),) * n, (Fraction(1),), ()), Size([arb(0)] * n, length=False)
     box = [arb(max(abs(x), 1e-9)) for x in start]

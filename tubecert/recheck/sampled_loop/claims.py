@@ -101,8 +101,8 @@ class Case:
         """Of this loop."""
         machine, own, n = self._spec.hardware, self._proven, len(self._spec.plant.states)
         H = arb_mat(n, len(self.slow), [eta.column[i] for i in range(n) for eta in self.slow])
-        (A, B, _), (F, G, M, N) = own.nominal, own.tables.values()
-        loop = Loop(A, B, H, F, G, M, N, machine.sample_time, machine.delay)
+        A, B, _ = own.nominal
+        loop = Loop(A, B, H, [*own.tables.values()], (machine.sample_time, machine.delay))
         noise, phases = Size.of(machine.noise, n), []
         for begin, stage, acting in phases_of(own.stages, loop.waiting):
             W, Z, U = (list(map(exact, sizes_)) for sizes_ in (stage.half_widths, stage.memory, acting))

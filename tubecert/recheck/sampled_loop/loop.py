@@ -8,9 +8,7 @@ of u and of zeta. Rows are those of (xi_k, heard_k). Implements: theory of the s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 from itertools import accumulate, pairwise
 
 from flint import arb, arb_mat
@@ -56,52 +54,27 @@ def around_zero(a: arb_mat) -> arb_mat:
     return arb_mat(a.nrows(), a.ncols(), [arb(0, x.abs_upper()) for x in a.entries()])
 
 
-@dataclass(frozen=True)
 class Loop:
-    """A (n, n), B (n, m), H (n, r); tables F (z, z), G (z, n), M (m, z), N (m, n); times in s."""
+    """A (n, n), B (n, m), H (n, r); tables F (z, z), G (z, n), M (m, z), N (m, n); sample time and delay in s.
 
-    A: arb_mat
-    B: arb_mat
-    H: arb_mat
-    F: arb_mat
-    G: arb_mat
-    M: arb_mat
-    N: arb_mat
-    sample: Fraction
-    delay: Fraction
+    `whole` samples of delay, Q, and the `rest` tau'; `waiting`, b: of how many earlier samples a delta acts or waits.
+    `parts`: rows that pick e (n), zeta (z), v_1..v_b (m each), eta (r), which are the `width` entries of xi; what is
+    heard of dy (n), u (m), zeta (z). `sent`: rows of delta_k, v_1, .., v_b, (m, ..) each.
+    """
 
-    @property
-    def whole(self) -> int:
-        """Q: whole samples of delay."""
-        return int(self.delay // self.sample)
-
-    @property
-    def rest(self) -> Fraction:
-        """tau': what is left of the delay."""
-        return self.delay % self.sample
-
-    @property
-    def waiting(self) -> int:
-        """b: of how many earlier samples a delta acts or waits."""
-        return self.whole + (self.rest > 0)
-
-    @cached_property
-    def parts(self) -> list[arb_mat]:
-        """Rows that pick e (n), zeta (z), v_1..v_b (m each), eta (r); what is heard of dy (n), u (m), zeta (z)."""
-        n, m, z = self.A.nrows(), self.B.ncols(), self.F.nrows()
-        ends = [0, *accumulate([n, z, *[m] * self.waiting, self.H.ncols(), n, m, z])]
-        return [picked(range(a, b), ends[-1]) for a, b in pairwise(ends)]
-
-    @property
-    def width(self) -> int:
-        """Entries of xi."""
-        return sum(own.nrows() for own in self.parts[:-3])
-
-    @cached_property
-    def sent(self) -> list[arb_mat]:
-        """Rows of delta_k, v_1, .., v_b, (m, ..) each."""
-        e, zeta, *waiting, _, heard, rounded, _ = self.parts
-        return [self.N * (e + heard) + self.M * zeta + rounded, *waiting]
+    def __init__(
+        self, A: arb_mat, B: arb_mat, H: arb_mat, tables: Sequence[arb_mat], times: tuple[Fraction, Fraction]
+    ) -> None:
+        (F, G, M, N), (sample, delay) = tables, times
+        self.A, self.B, self.H, self.sample = A, B, H, sample
+        self.whole, self.rest = divmod(delay, sample)
+        self.waiting = self.whole + (self.rest > 0)
+        n, m, z = A.nrows(), B.ncols(), F.nrows()
+        ends = [0, *accumulate([n, z, *[m] * self.waiting, H.ncols(), n, m, z])]
+        self.parts, self.width = [picked(range(a, b), ends[-1]) for a, b in pairwise(ends)], ends[-4]
+        e, zeta, *waiting, _, heard, rounded, lost = self.parts
+        self.sent = [N * (e + heard) + M * zeta + rounded, *waiting]
+        self._kept = G * (e + heard) + F * zeta + lost
 
     def flow(self, t: Ball, order: int = 0) -> arb_mat:
         """e^(S t) with S = [A H B; 0 0 0; 0 0 0], or its derivative of an order, for every t of the ball.
@@ -129,6 +102,5 @@ class Loop:
     @property
     def step(self) -> arb_mat:
         """Those of xi_(k+1), (width, ..): AA, and NN."""
-        e, zeta, *_, eta, heard, _, rounded = self.parts
-        kept = self.G * (e + heard) + self.F * zeta + rounded
-        return stacked([self.error(exact(self.sample), later=True), kept, *self.sent[:-1], eta])
+        moved, eta = self.error(exact(self.sample), later=True), self.parts[-4]
+        return stacked([moved, self._kept, *self.sent[:-1], eta])
