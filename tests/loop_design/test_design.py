@@ -33,7 +33,7 @@ def mean(W):
 def test_widths_are_those_of_a_longer_search(machine, widths):
     found = design(machine)
     assert mean(found.W) < 1.05 * mean(widths)
-    assert np.isfinite(found.F).all()
+    assert np.isfinite(found.tables.F).all()
 
 
 @pytest.mark.slow
@@ -44,8 +44,8 @@ def test_a_quadrotor_with_noise_keeps_a_tube_within_its_inputs():
     assert (machine.room >= found.U).all()
     assert (found.W > 0).all()
     x, z = [0, 2, 3, 5], [1, 4]  # hovering decouples
-    assert not found.N[np.ix_([0], x)].any()
-    assert not found.N[np.ix_([1], z)].any()
+    assert not found.tables.N[np.ix_([0], x)].any()
+    assert not found.tables.N[np.ix_([1], z)].any()
 
 
 @pytest.mark.slow
@@ -61,9 +61,9 @@ def test_tables_are_numbers_of_single_precision_and_the_same_every_time():
     told = []
     first, second = design(double(), lambda *step: told.append(step)), design(double())
     for name in "FGMN":
-        table = getattr(first, name)
+        table = getattr(first.tables, name)
         np.testing.assert_array_equal(table, table.astype(np.float32))
-        np.testing.assert_array_equal(table, getattr(second, name))
+        np.testing.assert_array_equal(table, getattr(second.tables, name))
     assert told == sorted(told)
     assert told[-1][0] <= first.evaluations
 
@@ -92,7 +92,7 @@ def test_units_do_not_matter():
 def test_components_of_eta_that_do_the_same_are_one_for_the_observer():
     """h through B and what a parameter does in the same row; one of them never moves."""
     twice = double(H=[[0, 0], [1, -2.0]], rate=[1.0, 0.0], magnitude=[5.0, 0.5])
-    assert len(design(twice).F) == len(design(double()).F) == 4
+    assert len(design(twice).tables.F) == len(design(double()).tables.F) == 4
 
 
 def test_a_constant_that_is_unknown_is_learnt():
@@ -129,7 +129,7 @@ def test_nothing_acts_and_nothing_is_asked(delay):
     """No noise, no eta, no wind, no limits: only a start."""
     found = design(plant([[1.0]], [[1.0]], H=np.zeros((1, 0)), delay=delay, sample_time=0.2, start=1.0))
     assert 1.0 <= found.W[0] < 30
-    assert np.isfinite(found.F).all()
+    assert np.isfinite(found.tables.F).all()
 
 
 def refused(machine):

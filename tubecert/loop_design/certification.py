@@ -28,17 +28,7 @@ from tubecert.loop_design.unfound import NoDesign, refuse_unmoved
 from tubecert.model import ControlAffineModel, build
 from tubecert.planner import propose as planner
 from tubecert.progress import Phase, Progress, Step, Unit
-from tubecert.sampled_loop.record import (
-    Certificate,
-    Claim,
-    Lack,
-    Nominal,
-    Notes,
-    Result,
-    Source,
-    Tables,
-    seal,
-)
+from tubecert.sampled_loop.record import Certificate, Claim, Lack, Notes, Result, Source, Tables, seal
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.setting import Loop
 from tubecert.sampled_loop.theorem import check, undefined
@@ -100,20 +90,20 @@ def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, No
     plain, narrow = _result(loop), np.ones(loop.inputs)
     for _ in range(_TRIES):
         try:
-            tables = _tables(remainders, narrow, report)
-            inequalities, stages = propose(remainders, tables, _told(report, "tube"))
+            found = _tables(remainders, narrow, report)
+            inequalities, stages = propose(remainders, found.tables, _told(report, "tube"))
         except NoDesign as error:
             names = loop.model.inputs if error.kind == "inputs" else loop.model.states
             where = "" if error.where is None else names[error.where]
             lack = Lack(kind=error.kind, where=where, needed=error.needed, allowed=error.allowed)
             return replace(plain, lacks=(lack,)), notes
-        checked = check(loop, tables, stages, inequalities.recipe)
-        notes = explain(inequalities, stages, tables.evaluations)
+        checked = check(loop, found.tables, stages, inequalities.recipe)
+        notes = explain(inequalities, stages, found.evaluations)
         over = {lack.where: lack for lack in checked.lacks if lack.kind == "inputs"}
         result = replace(
             plain,
             verdict=checked.verdict,
-            controller=Tables(tables.F, tables.G, tables.M, tables.N),
+            controller=found.tables,
             tube=stages,
             inputs=checked.inputs,
             clearance=checked.clearance,
@@ -159,8 +149,8 @@ def _tables(remainders: Remainders, narrow: Array, report: Progress | None) -> D
     if loop.horizon is None:
         half = np.array([float(high - low) / 2 for low, high in loop.spec.safe_set])
         refuse_unmoved(loop.A * half / half[:, None], np.zeros((n, 1)))
-    shapes = {"F": (0, 0), "G": (0, n), "M": (m, 0), "N": (m, n), "W": (n,), "U": (m,)}
-    return Design(**{name: np.zeros(shape) for name, shape in shapes.items()}, evaluations=0)
+    none = Tables(*map(np.zeros, ((0, 0), (0, n), (m, 0), (m, n))))
+    return Design(none, np.zeros(n), np.zeros(m), evaluations=0)
 
 
 def _result(loop: Loop) -> Result:
@@ -176,5 +166,5 @@ def _result(loop: Loop) -> Result:
         ),
         claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
         planned=loop.knots,
-        nominal=Nominal(loop.A, loop.B, loop.E),
+        nominal=loop.nominal,
     )

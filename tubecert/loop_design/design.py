@@ -35,13 +35,11 @@ WISH = 0.9  # of a half-width that is wished is aimed at
 UNASKED = 2.0  # times its first half-width is what a state may have for another one's wish
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Design(Tables):
-    """delta = M zeta + N dy, zeta+ = F zeta + G dy with zeta = (e, eta, v) observed, in numbers of single precision.
+@dataclass(frozen=True, slots=True, eq=False)
+class Design:
+    """Tables with zeta = (e, eta, v) observed; W (n,) and U (m,) as floats find them; `evaluations` of the search."""
 
-    W (n,), U (m,): the tube as floats find it. `evaluations` of the search.
-    """
-
+    tables: Tables
     W: Array
     U: Array
     evaluations: int
@@ -72,9 +70,8 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
     if (found := observer.table(weights)) is None:
         raise NoDesign("no_design")
     (n, m), theta = plant.B.shape, rounded(observer, found, units)
-    W, U = _tube(plant, theta)
-    F, G, M, N = theta[m:, n:], theta[m:, :n], theta[:m, n:], theta[:m, :n]
-    return Design(F=F, G=G, M=M, N=N, W=W, U=U, evaluations=search.evaluations)
+    tables = Tables(theta[m:, n:], theta[m:, :n], theta[:m, n:], theta[:m, :n])
+    return Design(tables, *_tube(plant, theta), evaluations=search.evaluations)
 
 
 def _tube(plant: Plant, theta: Array) -> tuple[Array, Array]:

@@ -17,19 +17,17 @@ _POINTS: Final = 401
 
 
 def explain(inequalities: Inequalities, stages: Sequence[Stage], evaluations: int) -> Notes:
-    """Shares of the first and the last stage and of the inputs, constants, and points of the plan."""
+    """Shares of the first and the last stage and of the inputs, and points of the plan."""
     model = inequalities.loop.model
     boxes = Boxes.of(stages, model, above=True)
     with np.errstate(all="ignore"):
         first, last = (_causes(inequalities, boxes, stage) for stage in (0, len(stages) - 1))
-    n, sizes = len(model.states), inequalities.phases(boxes)[2]
-    constants = {"eta_size": sizes.size, "eta_rate": sizes.rate, "eta_first": sizes.first}
+    n = len(model.states)
     return replace(
         _points(inequalities.loop.plan),
         start=dict(zip(model.states, first, strict=False)),
         long_run=dict(zip(model.states, last, strict=False)),
         deviations=dict(zip(model.inputs, first[n:], strict=False)),
-        constants={name: tuple(own.tolist()) for name, own in constants.items() if np.isfinite(own).all()},
         evaluations=evaluations,
     )
 

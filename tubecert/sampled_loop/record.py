@@ -212,14 +212,13 @@ class Notes:
     """What explains a result and claims nothing.
 
     `start` and `long_run`: what fills each half-width in the first and in the last stage; `deviations`: each input.
-    `constants`: sizes of what acts. `samples_t`, `samples_x` and `samples_u` are points of the plan, to be drawn.
+    `samples_t`, `samples_x` and `samples_u` are points of the plan, to be drawn.
     `evaluations`: how many controllers were tried.
     """
 
     start: Mapping[str, Shares] = field(default_factory=dict)
     long_run: Mapping[str, Shares] = field(default_factory=dict)
     deviations: Mapping[str, Shares] = field(default_factory=dict)
-    constants: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     samples_t: tuple[float, ...] = ()
     samples_x: tuple[tuple[float, ...], ...] = ()
     samples_u: tuple[tuple[float, ...], ...] = ()

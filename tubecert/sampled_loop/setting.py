@@ -25,6 +25,7 @@ from tubecert.expression import ZERO, Expression, constant, free_symbols, symbol
 from tubecert.expression.matrix import column, combine, multiply
 from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.sampled_loop.matrices import lengths, nothing, total
+from tubecert.sampled_loop.record import Nominal
 from tubecert.spec import Spec
 from tubecert.spec.types import Afterwards, Hold, Knots, Vector
 from tubecert.trajectory.plan import Family, Plan
@@ -93,7 +94,7 @@ class Loop:
     ) -> None:  # fmt: skip
         assert spec.hardware is not None
         self.spec, self.model, self.plan, self.knots = spec, model, plan, knots
-        self.A, self.B, self.E, self.slow = A, B, E, slow
+        self.A, self.B, self.E, self.slow, self.nominal = A, B, E, slow, Nominal(A, B, E)
         self.states, self.inputs = n, m = len(model.states), len(model.inputs)
         self.names = (*model.states, *model.inputs)
         self.hardware, self.sample_time = spec.hardware, spec.hardware.sample_time
