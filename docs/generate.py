@@ -23,10 +23,11 @@ sys.path.insert(0, str(ROOT))
 
 from tubecert import records  # noqa: E402
 from tubecert.certificate.effective import Effective  # noqa: E402
+from tubecert.enclosure.interval import Array  # noqa: E402
 from tubecert.expression import MAX_LENGTH, MAX_NAME_LENGTH  # noqa: E402
 from tubecert.records import refer  # noqa: E402
 from tubecert.report import pages  # noqa: E402
-from tubecert.sampled_loop.record import FORMAT, HexMatrix, Notes, Result  # noqa: E402
+from tubecert.sampled_loop.record import FORMAT, Notes, Result  # noqa: E402
 from tubecert.spec.keys import LIST, NAME, NUMBER, PAIR, Section  # noqa: E402
 from tubecert.spec.load import FILE  # noqa: E402
 from tubecert.spec.plan import PLANS  # noqa: E402
@@ -321,7 +322,7 @@ def _of_source(source: str, group: list[dict[str, Any]]) -> str:
 
 def sampled_loop() -> dict[str, Any]:
     """The schema of certificates of sampled loops, from their records and the words of these."""
-    refer(HexMatrix, "matrix")
+    refer(Array, "matrix")
     refer(Effective, "specification")
     result, notes = (_described(records.schema(kind), kind) for kind in (Result, Notes))
     words = {

@@ -50,7 +50,8 @@ foreign(np.ndarray, _hex, _unhex)
 class Tables:
     """The controller: delta = M zeta + N dy, zeta+ = F zeta + G dy, with dy = y - x*(t_k) and zeta(0) = 0.
 
-    Shapes: F (z, z), G (z, n), M (m, z), N (m, n); entries are numbers of single precision. z = 0 with N = 0: none.
+    Row by row, in hexadecimal texts: `F` (z, z), `G` (z, n), `M` (m, z), `N` (m, n), exact, of single precision. z = 0
+    with N = 0: none.
     """
 
     F: Array
@@ -66,7 +67,10 @@ class Tables:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nominal:
-    """The matrices of the error equation, any floats: A (n, n), B (n, m), E (n, k) of the disturbance."""
+    """The matrices of the error equation, any floats.
+
+    Row by row, in hexadecimal texts: `A` (n, n), `B` (n, m), `E` (n, k) of the disturbance, exact.
+    """
 
     A: Array
     B: Array
