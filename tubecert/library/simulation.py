@@ -101,7 +101,7 @@ class Simulation(_Campaign):
 
         Raises `TargetError`.
         """
-        from tubecert.simulation.adaptive.files import write
+        from tubecert.simulation.adaptive.figures import write
         from tubecert.simulation.folder import prepared
 
         with prepared(os.fspath(folder)):

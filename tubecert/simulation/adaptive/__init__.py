@@ -17,5 +17,5 @@ Implements: theory 2 to 4b, the loops.
 | `uncertainty` | random members and adversaries of the certified class |
 | `attack`, `campaign` | random runs and the search for the worst; all that one command simulates |
 | `judge` | runs against promises; distances from obstacles |
-| `files`, `figures` | a campaign as files, as figures |
+| `figures` | a campaign as files, figures among them |
 """

@@ -61,20 +61,14 @@ def _random_starts(setting: Setting, genes: Array) -> Array:
     direction, outside, radius = 2 * genes[:, :n] - 1, genes[:, n] < 0.5, genes[:, n + 1] ** (1 / n)
     if not setting.within:
         direction = np.where(outside[:, None], np.sign(direction), direction)
-    return _started(setting, direction, np.where(outside, 1.0, radius))
-
-
-def _started(setting: Setting, direction: Array, radius: Array) -> Array:
-    if not setting.varied:
-        return np.tile(setting.x0, (len(direction), 1))
-    return np.array([setting.started(*each) for each in zip(direction, radius, strict=True)])
+    return setting.started(direction, np.where(outside, 1.0, radius)[:, None])
 
 
 def bred(setting: Setting, genes: Array) -> Cases:
     """The adversaries that genes (N, G) in [0, 1] describe, and where their runs start."""
     kind = setting.uncertainty
     aimed, beside, begin = np.split(genes, np.cumsum([kind.adversary, kind.beside]), axis=1)
-    start = _started(setting, 2 * begin - 1, np.ones(len(genes)))
+    start = setting.started(2 * begin - 1 if setting.varied else np.zeros((len(genes), 1)))
     offset = (start - setting.centre) @ setting.S.T
     return _cases(setting, start, adversaries(kind, aimed, offset, setting.layer), beside)
 

@@ -229,11 +229,10 @@ def simulate(
 
 def _specified(setting: Setting) -> Cases:
     """Start and h of the specification."""
-    start = setting.started(np.ones(len(setting.x0))) if setting.varied else setting.x0
     own = Disturbance.from_expressions(setting.h, setting.model, 1)
     if setting.uncertainty.sources is not None:
         own = usual(setting.uncertainty, own)
-    return Cases(start[None], own)
+    return Cases(setting.started(np.ones((1, len(setting.x0)))), own)
 
 
 def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numbers: range) -> list[Runs]:

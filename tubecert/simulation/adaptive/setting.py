@@ -66,11 +66,13 @@ class Setting(Certified):
         """Whether there is more than one start."""
         return self.within > 0 or bool(self.spread.any())
 
-    def started(self, direction: Array, radius: float = 1.0) -> Array:
-        """The start (n,) in a direction: at a part of the radius of the ball, or in the box (|direction_i| <= 1)."""
+    def started(self, direction: Array, radius: Array | float = 1.0) -> Array:
+        """Starts (N, n) in directions: at parts (N, 1) of the ball's radius, or in the box (|direction_i| <= 1)."""
         if self.within:
-            length = float(np.linalg.norm(direction)) or 1.0
-            return np.asarray(self.centre + self.within * radius * direction / length)
+            length = np.linalg.norm(direction, axis=1, keepdims=True)
+            return np.asarray(
+                self.centre + self.within * radius * direction / np.where(length > 0, length, 1.0)
+            )
         return np.asarray(self.x0 + self.spread * direction)
 
     def along(self, plan: Plan) -> Setting:
