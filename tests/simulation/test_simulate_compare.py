@@ -301,10 +301,12 @@ def test_what_unknown_parameters_do_beside_the_inputs_counts(numbers):
 
 def test_pushes_are_bounded_where_metric_and_inputs_are_constant(numbers):
     """B'M gamma_s changes with x by |B| A, with t by |B| A |x*'|, and |x*'| <= |f + B u*| + |p|."""
-    assert class_of(numbers, 2, 1).push is None
+    assert class_of(numbers, setting("flat").model).push is None
     none = dict.fromkeys(("M_x", "B_x"), Bound(below=0.0, above=0.0))
     constants = {**numbers.result.constants, **none}
     c = replace(numbers, result=replace(numbers.result, constants=constants))
     slope = c["B"] * 1.9
-    assert class_of(c, 2, 1).push == pytest.approx((slope, slope * (c["drift_on_plan"] + c["plan_defect"])))
-    assert class_of(replace(c, upper=None), 2, 1).push is None
+    assert class_of(c, setting("flat").model).push == pytest.approx(
+        (slope, slope * (c["drift_on_plan"] + c["plan_defect"]))
+    )
+    assert class_of(replace(c, upper=None), setting("flat").model).push is None

@@ -174,7 +174,7 @@ def _attack_data(attack: Attack, setting: Setting) -> dict[str, Json]:
             "start": start[0].tolist(),
             "h": {name: getattr(h, name)[..., 0].tolist() for name in _WAVES},
         }
-        if setting.uncertainty.sources:
+        if setting.uncertainty.beside:
             data["adversary"]["beside"] = {name: getattr(h, name)[..., 0].tolist() for name in _BESIDE}
     return data
 
@@ -230,7 +230,7 @@ def simulate(
 def _specified(setting: Setting) -> Cases:
     """Start and h of the specification."""
     own = Disturbance.from_expressions(setting.h, setting.model, 1)
-    if setting.uncertainty.sources is not None:
+    if setting.uncertainty.beside:
         own = usual(setting.uncertainty, own)
     return Cases(setting.started(np.ones((1, len(setting.x0)))), own)
 

@@ -25,7 +25,7 @@ from tubecert.records import Json, to_json
 from tubecert.simulation.adaptive.loops import Controller, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.reading import Certified, Promise, certified_plan, promise
 from tubecert.simulation.adaptive.times import output_times
-from tubecert.simulation.adaptive.uncertainty import Class, Sources, class_of
+from tubecert.simulation.adaptive.uncertainty import Class, class_of
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
 
@@ -119,7 +119,7 @@ def setting_of(
         centre=centre,
         within=0.0 if spec.within is None else float(spec.within),
         spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
-        uncertainty=class_of(certified, len(spec.states), len(spec.inputs), _sources(certified, model)),
+        uncertainty=class_of(certified, model),
         E=_wind(model, field),
         rest=_rest(model, field),
         h=None if wanted is None else tuple(term.expression for term in wanted),
@@ -147,19 +147,6 @@ def _start_of(plan: Plan) -> Array:
 def _coordinates(result: Result) -> Coordinates | None:
     rows = None if result.tube is None else result.tube.coordinates
     return None if rows is None else Coordinates(tuple(tuple(map(Fraction, row)) for row in rows))
-
-
-def _sources(certified: Certified, model: ControlAffineModel) -> Sources | None:
-    """What acts beside h; None if nothing does."""
-    if not model.E and not model.parameters:
-        return None
-    ranges = [[float(low), float(high)] for _, (low, high) in model.parameters]
-    return Sources(
-        pace=certified.rate,
-        k=len(model.E[0]) if model.E else 0,
-        wind=float(model.wind_bound or 0),
-        ranges=np.array(ranges).reshape(-1, 2),
-    )
 
 
 def _rest(model: ControlAffineModel, fields: Fields) -> Matrix:

@@ -12,12 +12,13 @@ Genes (N, G) in [0, 1] describe N members, one for each lane, and what acts besi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.model import ControlAffineModel
 from tubecert.simulation.adaptive.loops import Disturbance
 from tubecert.simulation.adaptive.reading import Certified
 
@@ -36,8 +37,9 @@ _ENDS: Final = 1.6  # parameters lie at the ends of their ranges in 3 of 8 cases
 class Class:
     """Bounds of |h|, |h_x|, |h_t| and |h(0, x(0))|, n states, m inputs.
 
-    `push` bounds how fast B'M gamma_s changes with x, and with t along the plan; None where that is not known.
-    `sources` are those of wind and unknown parameters, if there are any.
+    `push` bounds how fast B'M gamma_s changes with x, and with t along the plan; None where that is not known. Beside h
+    there may be |w| <= `wind` for a w of k entries, which turns round as `pace` (lambda, 1/s) says, and parameters in
+    `ranges` (p, 2).
     """
 
     h: float
@@ -47,7 +49,10 @@ class Class:
     n: int
     m: int
     push: tuple[float, float] | None = None
-    sources: Sources | None = None
+    pace: float = 0.0
+    k: int = 0
+    wind: float = 0.0
+    ranges: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def adversary(self) -> int:
@@ -62,16 +67,8 @@ class Class:
     @property
     def beside(self) -> int:
         """How many describe wind and unknown parameters."""
-        return 0 if self.sources is None else 3 + self.sources.k + len(self.sources.ranges)
-
-
-class Sources(NamedTuple):
-    """What acts beside h: |w| <= `wind` for a w of k entries, parameters in `ranges` (p, 2); `pace` lambda, 1/s."""
-
-    pace: float
-    k: int
-    wind: float
-    ranges: Array
+        count = self.k + len(self.ranges)
+        return 3 + count if count else 0
 
 
 class Waves(NamedTuple):
@@ -84,7 +81,7 @@ class Waves(NamedTuple):
     push: Array
 
 
-def class_of(certified: Certified, n: int = 0, m: int = 0, sources: Sources | None = None) -> Class:
+def class_of(certified: Certified, model: ControlAffineModel) -> Class:
     """The class that a certificate is about; pushes only where the metric and B are constant."""
     constants = {name: certified[name] for name in ("h", "h_x", "h_t", "h_initial")}
     flat = certified["M_x"] == 0 and certified["B_x"] == 0
@@ -92,7 +89,17 @@ def class_of(certified: Certified, n: int = 0, m: int = 0, sources: Sources | No
     if flat and certified.upper is not None:
         slope = certified["B"] * certified.upper
         push = slope, slope * (certified["drift_on_plan"] + certified["plan_defect"])
-    return Class(**constants, n=n, m=m, push=push, sources=sources)
+    ranges = [[float(low), float(high)] for _, (low, high) in model.parameters]
+    return Class(
+        **constants,
+        n=len(model.states),
+        m=len(model.inputs),
+        push=push,
+        pace=certified.rate,
+        k=len(model.E[0]) if model.E else 0,
+        wind=float(model.wind_bound or 0),
+        ranges=np.array(ranges).reshape(-1, 2),
+    )
 
 
 def random_members(kind: Class, genes: Array, offset: Array) -> Waves:
@@ -191,16 +198,15 @@ def _begun(kind: Class, amplitude: Array, angle: Array, push: Array) -> Array:
 
 def beside_of(kind: Class, genes: Array) -> dict[str, Array]:
     """Genes of N lanes: the aim of the wind, how fast it turns, its phase, its direction, the parameters."""
-    own = kind.sources or Sources(0.0, 0, 0.0, np.zeros((0, 2)))
-    low, high = own.ranges.T
-    if kind.sources is None:
+    low, high = kind.ranges.T
+    if not kind.beside:
         genes = np.zeros((len(genes), 3))
-    turns = np.where(genes[:, 1] > _STEADY, own.pace * 10 ** (4 * genes[:, 1] - 1), 0.0)
-    share = np.clip(_ENDS * (genes[:, 3 + own.k :] - 0.5) + 0.5, 0.0, 1.0)
+    turns = np.where(genes[:, 1] > _STEADY, kind.pace * 10 ** (4 * genes[:, 1] - 1), 0.0)
+    share = np.clip(_ENDS * (genes[:, 3 + kind.k :] - 0.5) + 0.5, 0.0, 1.0)
     return {
-        "wind": np.full(len(genes), own.wind * _ROUND),
+        "wind": np.full(len(genes), kind.wind * _ROUND),
         "aim": np.floor(2.999 * genes[:, 0]),
-        "blowing": _unit(genes[:, 3 : 3 + own.k]).T,
+        "blowing": _unit(genes[:, 3 : 3 + kind.k]).T,
         "gusting": np.stack([turns, 2 * np.pi * np.where(turns > 0, genes[:, 2], 0.25)]),
         "theta": (low + (high - low) * share).T,
     }
@@ -222,7 +228,7 @@ def acting(kind: Class, waves: Waves, genes: Array, centre: Array, layer: float)
     waves = waves._replace(phase=waves.phase - waves.wave @ centre)
     return Disturbance(
         base=None,
-        radius=np.full(N, kind.h if kind.sources else np.inf),
+        radius=np.full(N, kind.h if kind.beside else np.inf),
         layer=np.full(N, layer),
         **{name: np.moveaxis(part, 0, -1) for name, part in waves._asdict().items()},
         **beside_of(kind, genes),
