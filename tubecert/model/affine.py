@@ -272,8 +272,7 @@ def _time_of(spec: Spec) -> Range | None:
     The reader takes no f that has neither.
     """
     terms = spec.drift or spec.f
-    owed = [duty.argument for term in terms for duty, _ in term.owed()]
-    if TIME not in free_symbols([*(term.expression for term in terms), *owed]):
+    if TIME not in free_symbols(part for term in terms for part in term.parts):
         return None
     if spec.trajectory.horizon is not None:
         return Fraction(0), spec.trajectory.horizon
@@ -286,8 +285,7 @@ def _time_of(spec: Spec) -> Range | None:
 def moving_parts(spec: Spec) -> list[Expression]:
     """What may depend on t for all time, h and f of the plant, and what must hold for them to be defined."""
     terms = [*(spec.uncertainty.h or ()), *(spec.drift or spec.f)]
-    owed = (duty.argument for term in terms for duty, _ in term.owed())
-    return [*(term.expression for term in terms), *owed]
+    return [part for term in terms for part in term.parts]
 
 
 def time_period(h: Iterable[Expression]) -> Interval | None:

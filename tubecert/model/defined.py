@@ -35,7 +35,7 @@ def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Find
         terms += [t for row in spec.disturbance.E for t in row]
     findings = [item for term in terms for item in _undefined(term, box, "the safe set", effort)]
     for term in () if spec.drift else spec.f:
-        moving = TIME in free_symbols([term.expression, *(duty.argument for duty, _ in term.owed())])
+        moving = TIME in free_symbols(term.parts)
         where = "the safe set and the horizon" if moving else "the safe set"
         findings += _undefined(term, over_time, where, effort)
     everywhere: dict[str, Range] = {**box, **dict(spec.ranges)}

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Final, Literal, TypeAlias
 
 from tubecert.errors import SpecError
-from tubecert.expression import Expression, free_symbols
+from tubecert.expression import free_symbols
 from tubecert.expression.waves import frequencies
 from tubecert.findings import Finding, Location, capped
 from tubecert.spec import codes, keys
@@ -318,7 +318,7 @@ def _read_named(
 
 def _check_moving(f: Field, drift: Sequence[Term], beside: Iterator[tuple[bool, str, str]]) -> None:
     """What is covered where f depends on t; `beside` is what is not, and what to write then."""
-    if TIME in free_symbols(_with_owed(drift)):
+    if TIME in free_symbols(part for term in drift for part in term.parts):
         for found, message, help in beside:
             if found:
                 f.fail(codes.RANGE, f"f depends on t, {message}", help)
@@ -341,14 +341,8 @@ def _beside_moving(
 
 def _returns(terms: Sequence[Term]) -> bool:
     """Whether a common period of terms, and of what they owe, is to be seen."""
-    found = frequencies(_with_owed(terms), TIME)
+    found = frequencies([part for term in terms for part in term.parts], TIME)
     return found is not None and (found.period is None or found.period[0] < _LONG)
-
-
-def _with_owed(terms: Sequence[Term]) -> list[Expression]:
-    return [
-        each for term in terms for each in (term.expression, *(duty.argument for duty in term.obligations))
-    ]
 
 
 def _check_version(field: Field | None) -> None:

@@ -118,7 +118,7 @@ def _read(sheet: Sheet, width: int) -> list[Row]:
             )
             return found
     if len(found) < 2 and not sheet.findings:
-        last = Cell(text="", line=max(len(sheet.source.lines) - 1, 0), column=0)
+        last = Cell(line=max(len(sheet.source.lines) - 1, 0))
         sheet.fail(last, codes.TABLE, f"a table needs 2 rows of numbers or more, not {len(found)}")
     return found
 

@@ -33,9 +33,9 @@ _DECIMAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE]([+-]?\d+))?", re.ASCII)
 class Cell:
     """A cell's text without its surroundings, and where it stands in its line."""
 
-    text: str
+    text: str = ""
     line: int
-    column: int
+    column: int = 0
 
 
 @dataclass(slots=True, kw_only=True)
@@ -107,7 +107,7 @@ def rows(sheet: Sheet, what: str) -> Iterator[list[Cell]]:
     for number, line in enumerate(sheet.source.lines):
         if line.count(",") >= MAX_COLUMNS:
             message = f"the line has {line.count(',') + 1:,} cells; {what} has at most {MAX_COLUMNS} columns"
-            sheet.fail(Cell(text="", line=number, column=0), codes.LIMIT, message)
+            sheet.fail(Cell(line=number), codes.LIMIT, message)
             return
         if line.strip():
             yield list(_cells(line, number))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import Final, NoReturn
 
@@ -64,11 +65,8 @@ class Source:
 
     def mark(self, index: int) -> Mark:
         """The mark of a position in the text."""
-        low, high = 0, len(self.starts)
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (middle, high) if self.starts[middle] <= index else (low, middle)
-        return Mark(line=low, column=index - self.starts[low])
+        line = bisect_right(self.starts, index) - 1
+        return Mark(line=line, column=index - self.starts[line])
 
 
 def read_source(path: str, kind: Kind = SPECIFICATION) -> Source:

@@ -109,7 +109,7 @@ def _rows(
         return None
     if header is None:
         message = "the plan file is empty"
-        return sheet.fail(Cell(text="", line=0, column=0), codes.PLAN_COLUMNS, message, _wanted(wanted))
+        return sheet.fail(Cell(line=0), codes.PLAN_COLUMNS, message, _wanted(wanted))
     places = _columns(sheet, header, wanted, others=columns is not None)
     if places is None:
         return None
@@ -129,7 +129,7 @@ def _rows(
             sheet.note(row)
         if len(sheet.findings) >= ENOUGH:
             return None
-    last = Cell(text="", line=len(sheet.source.lines) - 1, column=0)
+    last = Cell(line=len(sheet.source.lines) - 1)
     if len(values) < 2 and not sheet.findings:
         message = f"a plan needs 2 rows or more below its header, not {len(values)}"
         sheet.fail(last if values else header[0], codes.PLAN_TIMES, message)
@@ -150,12 +150,8 @@ def _columns(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, other
         cells = "has 1 cell, which is" if len(header) == 1 else f"has {len(header)} cells, none of which is"
         message = f"the first line {cells} t, a state or an input"
         commas = len(header) == 1 and re.search(r"[;\t ]", header[0].text)
-        return sheet.fail(
-            Cell(text="", line=header[0].line, column=0),
-            codes.PLAN_COLUMNS,
-            message,
-            f"separate columns by commas; {_wanted(wanted)}" if commas else _wanted(wanted),
-        )
+        help = f"{'separate columns by commas; ' if commas else ''}{_wanted(wanted)}"
+        return sheet.fail(Cell(line=header[0].line), codes.PLAN_COLUMNS, message, help)
     # of columns with names that a stranger chose nothing is shown before a row of numbers
     sheet.shown = not others and all(_NAME.fullmatch(cell.text) for cell in header)
     place = _placed(sheet, header, wanted, others=others)

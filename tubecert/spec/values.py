@@ -29,6 +29,11 @@ class Term:
     def __post_init__(self) -> None:
         assert len(self.obligations) == len(self.places)
 
+    @property
+    def parts(self) -> tuple[Expression, ...]:
+        """The expression, and what the obligations are about."""
+        return self.expression, *(duty.argument for duty in self.obligations)
+
     def owed(self) -> Iterator[tuple[Obligation, Location]]:
         """The obligations with where each stands."""
         return zip(self.obligations, self.places, strict=True)
