@@ -432,6 +432,9 @@ def _words(make: type) -> dict[str, str]:
     return found
 
 
+_MATRIX = "A matrix of floats (p, q) that are exact numbers: written as hexadecimal texts, row by row."
+
+
 def _described(form: dict[str, Any], kind: Any) -> dict[str, Any]:
     """A record's schema, closed, with the sentence of its words that names each key, or else all of them."""
     words = " ".join((kind.__doc__ or "").split())
@@ -442,11 +445,9 @@ def _described(form: dict[str, Any], kind: Any) -> dict[str, Any]:
         target = next((each for each in _forms(value) if "properties" in each), None)
         if inner is not None and target is not None:
             _described(target, inner)
-        own = (
-            " ".join((inner.__doc__ or "").partition("\n\n")[0].split())
-            if inner
-            else f"{key}.".replace("_", " ")
-        )
+        own = _MATRIX if hints[key] == Array else f"{key}.".replace("_", " ")
+        if inner:
+            own = " ".join((inner.__doc__ or "").partition("\n\n")[0].split())
         told = next((sentence.rstrip(";") for sentence in sentences if f"`{key}`" in sentence), own)
         form["properties"][key] = _of_one_kind(value) | {"description": told}
     form["additionalProperties"] = False
