@@ -87,12 +87,12 @@ def _points(entry: Field, width: int, parameters: Mapping[str, Expression]) -> l
 
 
 def _from_file(entry: Field, width: int) -> list[Row] | None:
-    file = opened(entry)
-    if file is None:
+    sheet = opened(entry)
+    if sheet is None:
         return None
-    found = _read(file.sheet, width)
-    entry.reader.findings.extend(capped(file.sheet.findings, codes.LIMIT, ENOUGH))
-    return None if file.sheet.findings else found
+    found = _read(sheet, width)
+    entry.reader.findings.extend(capped(sheet.findings, codes.LIMIT, ENOUGH))
+    return None if sheet.findings else found
 
 
 def _read(sheet: Sheet, width: int) -> list[Row]:

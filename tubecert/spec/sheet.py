@@ -42,9 +42,11 @@ class Cell:
 class Sheet:
     """A file being read, and what is wrong with it; its lines are `shown` once it is known to be what it should.
 
-    `lines`: where the header and every row of numbers stand.
+    `name` as written, `data` its bytes; `lines`: where the header and every row of numbers stand.
     """
 
+    name: str
+    data: bytes = field(repr=False)
     source: Source
     shown: bool = False
     findings: list[Finding] = field(default_factory=list)
@@ -63,16 +65,7 @@ class Sheet:
         self.lines.append(Location(file=self.source.file, line=cells[0].line + 1, column=1))
 
 
-@dataclass(frozen=True, slots=True)
-class Opened:
-    """A file that a specification names: its name as written, its bytes, and its text as a sheet."""
-
-    name: str
-    data: bytes
-    sheet: Sheet
-
-
-def opened(entry: Field) -> Opened | None:
+def opened(entry: Field) -> Sheet | None:
     """The file that a specification names, relative to the specification's own folder."""
     name = entry.text("the name of a CSV file")
     if name is None:
@@ -84,7 +77,7 @@ def opened(entry: Field) -> Opened | None:
     path = Path(entry.reader.source.file).parent / name
     try:
         data = read(str(path), PLAN)
-        return Opened(name, data, Sheet(source=decoded(str(path), data)))
+        return Sheet(name=name, data=data, source=decoded(str(path), data))
     except TubecertError as error:
         _forward(entry, error)
         return None

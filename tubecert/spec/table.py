@@ -74,18 +74,17 @@ def read_table(
     entry: Field, columns: tuple[Column, ...] | None, names: Names, interpolation: Interpolation
 ) -> Table | None:
     """The plan file that a specification names, relative to the specification's own folder."""
-    file = opened(entry)
-    if file is None:
+    sheet = opened(entry)
+    if sheet is None:
         return None
-    sheet = file.sheet
     found, n = _rows(sheet, columns, names, interpolation), len(names.states)
     entry.reader.findings.extend(capped(sheet.findings, codes.LIMIT, ENOUGH))
     if found is None or sheet.findings:
         return None
     header, *lines = sheet.lines
     return Table(
-        file=file.name,
-        sha256=hashlib.sha256(file.data).hexdigest(),
+        file=sheet.name,
+        sha256=hashlib.sha256(sheet.data).hexdigest(),
         knots=Knots(
             t=tuple(row[0] - found[0][0] for row in found),
             x=tuple(tuple(row[1 : n + 1]) for row in found),
