@@ -192,7 +192,7 @@ class Search:
         )
         left = {place: float(bound[take].max()) for place, take in enumerate(taken)}
 
-        def ready(place: int, held: _Held) -> None:
+        def ready(place: int, held: Supremum) -> None:
             self.count += held.boxes
             left[place] = held.above
             self._tell(max(left.values()))
@@ -278,16 +278,6 @@ class Search:
             self.at = {v: float(x) for v, x in zip(self.variables, places[best], strict=True)}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Held:
-    """What a part of a search came to: as `Supremum`, of its own boxes."""
-
-    below: float
-    above: float
-    at: dict[str, float]
-    boxes: int
-
-
 @dataclass(frozen=True, slots=True)
 class _Part:
     """A search in boxes, each with a bound, that knows the value `below`; sent to workers as it is."""
@@ -298,14 +288,14 @@ class _Part:
     below: float
     extent: Array
 
-    def __call__(self, boxes: _Boxes) -> _Held:
+    def __call__(self, boxes: _Boxes) -> Supremum:
         """What the boxes hold."""
         with np.errstate(all="ignore"):
             search = Search(self.objective, self.domain, self.effort)
             search.below, search.extent = self.below, self.extent
             _, _, bound = search.search(*boxes)
         above = float(max(search.settled, bound.max(initial=-np.inf)))
-        return _Held(below=search.below, above=above, at=search.at, boxes=search.count)
+        return Supremum(below=search.below, above=above, at=search.at, boxes=search.count, reached=False)
 
 
 def _exceeds(value: float, other: Array | float) -> NDArray[np.bool_]:
@@ -323,12 +313,12 @@ def _shared(
     part: _Part,
     items: Sequence[_Boxes],
     workers: Executor | None,
-    ready: Callable[[int, _Held], None],
-) -> list[_Held]:
+    ready: Callable[[int, Supremum], None],
+) -> list[Supremum]:
     """What every part holds, in order; what is left of workers that are lost is done here."""
-    found: dict[int, _Held] = {}
+    found: dict[int, Supremum] = {}
 
-    def kept(place: int, held: _Held) -> None:
+    def kept(place: int, held: Supremum) -> None:
         found[place] = held
         ready(place, held)
 

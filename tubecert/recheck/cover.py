@@ -20,7 +20,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import inf
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from flint import arb, ctx
 
@@ -104,30 +104,32 @@ def stated(holds: bool, why: str) -> Outcome:
     return CONFIRMED if holds else Outcome(verdict="contradicted", why=why)
 
 
-class Domain(Protocol):
-    """A set of points, known through boxes."""
+class Domain:
+    """A set of points, known through boxes; as it stands, one that boxes never leave."""
 
     def needed(self, variables: tuple[str, ...]) -> tuple[str, ...]:
         """The variables to split: those given, then the domain's own."""
-        ...
+        return variables
 
     def start(self, variables: tuple[str, ...]) -> list[State]:
         """Boxes that cover it."""
-        ...
+        raise NotImplementedError
 
     def cut(self, variables: tuple[str, ...], state: State) -> State | None:
         """A smaller box with the same points of the domain; None if there are none."""
-        ...
+        del variables
+        return state
 
     def point(self, variables: tuple[str, ...], state: State) -> list[Ball] | None:
         """A point of the domain in or near the box; None if none is known."""
-        ...
+        raise NotImplementedError
 
     def pull(
         self, variables: tuple[str, ...], state: State, caused: list[float], spread: list[float]
     ) -> list[float]:
-        """How much splitting each variable promises."""
-        ...
+        """How much splitting each variable promises: what causes the width of the bound."""
+        del variables, state, spread
+        return caused
 
 
 def prove(test: Test, domain: Domain, budget: int) -> Outcome:
@@ -208,24 +210,15 @@ def _shown(variables: Sequence[str], at: Sequence[Ball]) -> str:
 Range = tuple[Fraction | Ball, Fraction | Ball]
 
 
-class Boxed:
+class Boxed(Domain):
     """A product of closed ranges; `needed` ones only are split."""
 
     def __init__(self, ranges: Mapping[str, Range]) -> None:
         self._ranges = {v: (as_ball(lo), as_ball(hi)) for v, (lo, hi) in ranges.items()}
 
-    def needed(self, variables: tuple[str, ...]) -> tuple[str, ...]:
-        """Nothing beside what is given."""
-        return variables
-
     def start(self, variables: tuple[str, ...]) -> list[State]:
         """The box itself, rounded outward."""
         return [([(floor(self._ranges[v][0]), ceiling(self._ranges[v][1])) for v in variables], None)]
-
-    def cut(self, variables: tuple[str, ...], state: State) -> State | None:
-        """Boxes never leave the domain."""
-        del variables
-        return state
 
     def point(self, variables: tuple[str, ...], state: State) -> list[Ball] | None:
         """The centre, moved inside."""
@@ -236,13 +229,6 @@ class Boxed:
                 return None
             found.append(arb(min(max(0.5 * lo + 0.5 * hi, low), high)))
         return found
-
-    def pull(
-        self, variables: tuple[str, ...], state: State, caused: list[float], spread: list[float]
-    ) -> list[float]:
-        """What causes the width of the bound."""
-        del variables, state, spread
-        return caused
 
 
 def as_ball(x: Fraction | Ball) -> Ball:

@@ -14,7 +14,7 @@ from flint import arb
 
 from tubecert.recheck.around import Around
 from tubecert.recheck.balls import Ball, ceiling, floor
-from tubecert.recheck.cover import Range, State, as_ball
+from tubecert.recheck.cover import Domain, Range, State, as_ball
 from tubecert.recheck.curve import Curve, Segment
 
 TIME = "t"
@@ -23,7 +23,7 @@ _MOST = 256  # segments that are looked at for one box: longer ones cover as wel
 _COARSE = 0.25  # a segment may be so long against the box
 
 
-class Tube:
+class Tube(Domain):
     """The tube over states, inputs (standing for u*), time, and ranges that do not depend on the plan."""
 
     def __init__(
