@@ -24,13 +24,7 @@ from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval, fraction_bounds
 from tubecert.enclosure.objective import Objective, SumOfNorms
 from tubecert.enclosure.pencil import Pencil, SumOfPencils
-from tubecert.expression import (
-    ONE,
-    ZERO,
-    Expression,
-    derivatives,
-    free_symbols,
-)
+from tubecert.expression import ONE, ZERO, Expression, derivatives, free_symbols
 from tubecert.expression.matrix import Matrix, column, constants, identity, multiply, transpose
 from tubecert.model import TIME
 from tubecert.trajectory.plan import Defect

@@ -20,14 +20,7 @@ from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import PI, Interval
 from tubecert.enclosure.pencil import scalar
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import (
-    ZERO,
-    Expression,
-    constant,
-    free_symbols,
-    substitute,
-    symbol,
-)
+from tubecert.expression import ZERO, Expression, constant, free_symbols, substitute, symbol
 from tubecert.expression.matrix import (
     Matrix,
     adjugate,

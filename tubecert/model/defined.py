@@ -9,11 +9,7 @@ from tubecert.enclosure.branch_and_bound import Effort, decide
 from tubecert.enclosure.domain import BoxDomain, Range
 from tubecert.enclosure.interval import fraction_bounds
 from tubecert.enclosure.pencil import scalar
-from tubecert.expression import (
-    Obligation,
-    free_symbols,
-    to_text,
-)
+from tubecert.expression import Obligation, free_symbols, to_text
 from tubecert.findings import Finding
 from tubecert.model.affine import TIME, moving_parts, nonzero, time_period, vanishes
 from tubecert.verdict import Verdict

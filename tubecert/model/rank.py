@@ -12,20 +12,8 @@ from tubecert.enclosure.interval import fraction_bounds
 from tubecert.enclosure.objective import Dependence
 from tubecert.enclosure.pencil import scalar
 from tubecert.enclosure.taylor import MOST_VERTICES
-from tubecert.expression import (
-    ZERO,
-    Expression,
-    constant,
-    free_symbols,
-    substitute,
-    topological,
-)
-from tubecert.expression.matrix import (
-    Matrix,
-    TooLargeError,
-    determinant,
-    null_space,
-)
+from tubecert.expression import ZERO, Expression, constant, free_symbols, substitute, topological
+from tubecert.expression.matrix import Matrix, TooLargeError, determinant, null_space
 from tubecert.model.affine import ControlAffineModel, decimals, nonzero, round_zero
 from tubecert.verdict import Verdict
 

@@ -9,14 +9,7 @@ from typing import Any
 
 from flint import arb
 
-from tubecert.recheck import (
-    clearances,
-    consistency,
-    geodesics,
-    inputs,
-    metric,
-    start,
-)
+from tubecert.recheck import clearances, consistency, geodesics, inputs, metric, start
 from tubecert.recheck import wind as disturbed
 from tubecert.recheck.case import Case
 from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width, largest_push

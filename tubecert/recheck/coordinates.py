@@ -14,16 +14,7 @@ from functools import cached_property
 from tubecert.recheck.metric import adjugate, determinant
 from tubecert.recheck.specified.numbers import Rows
 from tubecert.recheck.system import System
-from tubecert.recheck.terms import (
-    Matrix,
-    all_zero,
-    matrix_slopes,
-    number,
-    plus,
-    scaled,
-    times,
-    turned,
-)
+from tubecert.recheck.terms import Matrix, all_zero, matrix_slopes, number, plus, scaled, times, turned
 from tubecert.recheck.terms import Rows as Terms
 
 

@@ -13,15 +13,7 @@ from fractions import Fraction
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.balls import (
-    Ball,
-    between,
-    ceiling,
-    exact,
-    is_indefinite,
-    proposed_largest,
-    whitening,
-)
+from tubecert.recheck.balls import Ball, between, ceiling, exact, is_indefinite, proposed_largest, whitening
 from tubecert.recheck.boxes import Box, Expansion, Field, Found
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.quotients import cancelled

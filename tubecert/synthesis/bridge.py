@@ -16,14 +16,7 @@ from scipy import sparse
 
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
-from tubecert.synthesis.conic import (
-    CVXPY,
-    Affine,
-    ConicProgram,
-    ConicSolution,
-    judged,
-    triangle,
-)
+from tubecert.synthesis.conic import CVXPY, Affine, ConicProgram, ConicSolution, judged, triangle
 
 
 def _cvxpy() -> Any:

@@ -19,13 +19,7 @@ from tubecert.synthesis.attack import Attack, Attacker, Judgement, counterexampl
 from tubecert.synthesis.conic import ConicSolution
 from tubecert.synthesis.forms import FormsTape, Unknowns, canonical, invariant_entries
 from tubecert.synthesis.problem import Proposal, SynthesisProblem
-from tubecert.synthesis.program import (
-    PointProgram,
-    Points,
-    contraction_points,
-    finite,
-    metric_points,
-)
+from tubecert.synthesis.program import PointProgram, Points, contraction_points, finite, metric_points
 from tubecert.verdict import Verdict
 
 ROUTE = "cegis"

@@ -25,17 +25,7 @@ from random import Random
 import numpy as np
 
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import (
-    ONE,
-    ZERO,
-    Expression,
-    cos,
-    free_symbols,
-    is_zero,
-    sin,
-    symbol,
-    topological,
-)
+from tubecert.expression import ONE, ZERO, Expression, cos, free_symbols, is_zero, sin, symbol, topological
 from tubecert.expression.graph import FUNCTIONS
 from tubecert.expression.matrix import (
     Matrix,

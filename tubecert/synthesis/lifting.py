@@ -19,16 +19,7 @@ from fractions import Fraction
 from functools import reduce
 from math import gcd
 
-from tubecert.expression import (
-    ONE,
-    ZERO,
-    Expression,
-    coefficient,
-    constant,
-    rebuild,
-    symbol,
-    topological,
-)
+from tubecert.expression import ONE, ZERO, Expression, coefficient, constant, rebuild, symbol, topological
 from tubecert.expression.matrix import Matrix, Rows, matrix
 
 _MOST = 6  # multiples of an angle that are expanded
