@@ -54,9 +54,7 @@ def test_what_is_said_of_a_lie_is_what_the_oracle_says(case):
         found = judge_all(made, {KINDS[kind]: everywhere(honest, lie)})
         section, holds = found.sections[kind_of(kind).key], oracle.proves(made.problem, lie)
         assert (found.verdict is Verdict.CERTIFIED) == (section.verdict is Verdict.CERTIFIED) == holds, words
-        assert (
-            (section.proof is not None) == bool(section.curve) == bool(section.judgement.beside) == holds
-        ), words
+        assert (section.proof is not None) == bool(section.curve) == bool(section.beside) == holds, words
         certified += holds
     assert 0 < certified < 200
 

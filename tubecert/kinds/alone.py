@@ -38,7 +38,7 @@ def _data(section: Section[NoGains]) -> AloneData:
         margin=None if at is None else margin_data(at.margins[ALONE.key]),
         distance=margin_data(alone.distance(section.problem)).printable(),
         uncertainty_limit=None if limit is None else printable_below(limit),
-        ultimate_radius=section.judgement.ultimate_radius,
+        ultimate_radius=section.ultimate_radius,
         shortfalls=missing_data(section.shortfalls),
     )
 

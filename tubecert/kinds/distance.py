@@ -74,14 +74,13 @@ class DistanceData(SectionData):
 
 
 def _data(section: Section[DistanceRecipe]) -> DistanceData:
-    judgement = section.judgement
-    recipes = judgement.around_at
+    recipes = section.around_at
     return DistanceData(
         verdict=section.verdict,
         split=_pair_data(section.at("split")),
         least_adaptation=_pair_data(section.at("least_adaptation")),
         asked=_pair_data(section.at("asked")),
-        ultimate_radius=judgement.ultimate_radius,
+        ultimate_radius=section.ultimate_radius,
         curve=GainPoint.along(section.curve),
         shortfalls=missing_data(section.shortfalls),
         margins_around=None
@@ -90,7 +89,7 @@ def _data(section: Section[DistanceRecipe]) -> DistanceData:
             bandwidth=tuple(recipe.bandwidth for recipe in recipes),
             adaptation_rate=recipes[0].adaptation_rate,
             predictor_gain=recipes[0].predictor_gain,
-            margin=proven_data(judgement.around[DISTANCE.key]),
+            margin=proven_data(section.around[DISTANCE.key]),
         ),
     )
 

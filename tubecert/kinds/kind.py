@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from math import inf, isfinite
 from typing import ClassVar, Generic, Literal
@@ -21,7 +21,7 @@ from tubecert.conditions.problem import Shortfall, TubeProblem
 from tubecert.conditions.theorem import LoopGains, Proposal, R, Theorem
 from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.enclosure.interval import Interval
-from tubecert.kernel import Checked, Judgement, Proof, judge
+from tubecert.kernel import Checked, Judgement, judge
 from tubecert.kinds import Name
 from tubecert.verdict import Verdict
 
@@ -126,56 +126,30 @@ def proven_data(values: Iterable[float]) -> tuple[float | None, ...]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Section(Generic[R]):
+class Section(Judgement[R]):
     """What the kernel decided about one kind over a problem, from what was proposed."""
 
     kind: Kind[R]
     problem: TubeProblem
     proposal: Proposal[R]
-    judgement: Judgement[R]
 
     @property
     def name(self) -> Name:
         """How its kind is called."""
         return self.kind.name
 
-    @property
-    def verdict(self) -> Verdict:
-        """On the gains of this kind."""
-        return self.judgement.verdict
-
-    @property
-    def decisive(self) -> Checked[R] | None:
-        """The gains that the verdict is about, with their margins."""
-        return self.judgement.decisive
-
     def at(self, role: str) -> Checked[R] | None:
         """The gains in a role, if there are any."""
-        return self.decisive if role == self.judgement.role else self.judgement.beside.get(role)
+        return self.decisive if role == self.role else self.beside.get(role)
 
     @property
     def predictor_gain(self) -> Fraction | None:
         """g of the decisive gains; None where there are none."""
         return None if self.decisive is None else getattr(self.decisive.recipe, "predictor_gain", None)
 
-    @property
-    def proof(self) -> Proof[R] | None:
-        """What a verdict `certified` rests on."""
-        return self.judgement.proof
-
     def input_bound(self, own: LimitedInput) -> InputBound | None:
         """What an input with limits does in the loop, by the proof; None if there is none."""
         return None if self.proof is None else own.bound(self.proof.input_shares)
-
-    @property
-    def shortfalls(self) -> tuple[Shortfall, ...]:
-        """What is missing."""
-        return self.judgement.shortfalls
-
-    @property
-    def curve(self) -> tuple[R, ...]:
-        """Proven gains along the bandwidth."""
-        return self.judgement.curve
 
     def claim(self) -> GainsSuffice:
         """That the decisive gains suffice, with what is proven to be left, and which condition sets the bandwidth."""
@@ -216,5 +190,6 @@ class Kind(Generic[R]):
 
     def section(self, problem: TubeProblem, proposal: Proposal[R]) -> Section[R]:
         """The section about what a search proposes."""
-        judgement = judge(problem, self.theorem, proposal)
-        return Section(kind=self, problem=problem, proposal=proposal, judgement=judgement)
+        judged = judge(problem, self.theorem, proposal)
+        decided = {item.name: getattr(judged, item.name) for item in fields(judged)}
+        return Section(kind=self, problem=problem, proposal=proposal, **decided)

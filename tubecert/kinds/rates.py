@@ -92,8 +92,8 @@ def _data(section: Section[RateRecipe]) -> RatesData:
     The infimum is the smallest bandwidth that (26a), (26b) admit; where (26b) binds it is not attained, and the pair
     has the smallest bandwidth that leaves 1 % of (26b).
     """
-    at, judgement, proposal = _pair_data(section.decisive), section.judgement, section.proposal
-    recipes = judgement.around_at
+    at, proposal = _pair_data(section.decisive), section.proposal
+    recipes = section.around_at
     return RatesData(
         verdict=section.verdict,
         bandwidth=None if at is None else at.bandwidth,
@@ -101,7 +101,7 @@ def _data(section: Section[RateRecipe]) -> RatesData:
         predictor_gain=None if at is None else at.predictor_gain,
         projection_radius=None if at is None else at.projection_radius,
         margins=None if at is None else at.margins,
-        ultimate_radius=judgement.ultimate_radius,
+        ultimate_radius=section.ultimate_radius,
         least_adaptation=_pair_data(section.at("least_adaptation")),
         curve=GainPoint.along(section.curve),
         bandwidth_infimum=proposal.infimum,
@@ -113,7 +113,7 @@ def _data(section: Section[RateRecipe]) -> RatesData:
             bandwidth=tuple(recipe.bandwidth for recipe in recipes),
             adaptation_rate=recipes[0].adaptation_rate,
             predictor_gain=recipes[0].predictor_gain,
-            margins={condition: proven_data(low) for condition, low in judgement.around.items()},
+            margins={condition: proven_data(low) for condition, low in section.around.items()},
         ),
     )
 
