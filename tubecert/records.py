@@ -86,7 +86,7 @@ def _exact(value: Json, path: str) -> Fraction:
 
 
 _FOREIGN: dict[Any, tuple[Callable[[Any], Json], Callable[[Json, str], Any]]] = {
-    Fraction: (exact_json, _exact),
+    Fraction: (exact_json, _exact)
 }
 
 

@@ -187,10 +187,7 @@ def _least(gaps: _Gaps, plan: Plan, effort: Effort) -> Clearance:
         done = min(done, float(np.min(bounds[~open_], initial=np.inf)))
         if spent > min(effort.budget, _MOST):
             return Clearance(below=min(done, float(np.min(bounds))), above=best, t=at)
-        lo, hi = (
-            np.concatenate([lo[open_], middle[open_]]),
-            np.concatenate([middle[open_], hi[open_]]),
-        )
+        lo, hi = (np.concatenate([lo[open_], middle[open_]]), np.concatenate([middle[open_], hi[open_]]))
     return Clearance(below=min(done, best), above=best, t=at)
 
 

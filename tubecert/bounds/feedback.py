@@ -38,9 +38,7 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
     """du as a supremum over x and mu in (0, largest]; C2 must hold at the model's rate, theory 2.1."""
     loss = partial(_loss, largest=largest)
     exact = WeightedPencil(
-        [model.F],
-        [model.BBt, model.W],
-        Weights(variables=(MU,), ends=tangents, loss=loss),
+        [model.F], [model.BBt, model.W], Weights(variables=(MU,), ends=tangents, loss=loss)
     )
     null = model.annihilator if model.constant_input else _moving_annihilator(model)
     if not null:
@@ -50,11 +48,7 @@ def exact_gain(model: ControlAffineModel, largest: float) -> Objective:
     F, W = (multiply(transpose(basis), multiply(a, basis)) for a in (model.F, model.W))
     gram = tuple(tuple(ONE if i == j < m else ZERO for j in range(n)) for i in range(n))
     ends = partial(down_to_zero, inputs=m, states=n)
-    split = WeightedPencil(
-        [F],
-        [gram, W],
-        Weights(variables=(MU,), ends=ends, loss=loss),
-    )
+    split = WeightedPencil([F], [gram, W], Weights(variables=(MU,), ends=ends, loss=loss))
     # products may hide from simplification that a variable cancels
     return FirstFinite(exact, split) if set(split.variables) <= set(exact.variables) else exact
 

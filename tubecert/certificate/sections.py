@@ -110,10 +110,7 @@ def claim_data(spec: Spec, period: tuple[Fraction, bool] | None) -> Claimed:
 
 
 def _wind(wind: Disturbance) -> Blowing:
-    return Blowing(
-        bound=number_text(wind.length),
-        rate=None if wind.rate is None else number_text(wind.rate),
-    )
+    return Blowing(bound=number_text(wind.length), rate=None if wind.rate is None else number_text(wind.rate))
 
 
 def _start(spec: Spec) -> Start:

@@ -22,10 +22,7 @@ def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
     """What no gains can overcome: dbar <= d0, dbar <= delta/lambda."""
     safe, whole = problem.proven(), problem.enclosed()
     allowed = reach(safe), reach(whole)
-    items = (
-        _obstacle("initial_distance", allowed, (safe.d0, whole.d0)),
-        _pushes(problem, allowed),
-    )
+    items = (_obstacle("initial_distance", allowed, (safe.d0, whole.d0)), _pushes(problem, allowed))
     return tuple(item for item in items if item is not None)
 
 

@@ -310,10 +310,7 @@ def _foremost(places: Array) -> int:
 
 
 def _shared(
-    part: _Part,
-    items: Sequence[_Boxes],
-    workers: Executor | None,
-    ready: Callable[[int, Supremum], None],
+    part: _Part, items: Sequence[_Boxes], workers: Executor | None, ready: Callable[[int, Supremum], None]
 ) -> list[Supremum]:
     """What every part holds, in order; what is left of workers that are lost is done here."""
     found: dict[int, Supremum] = {}

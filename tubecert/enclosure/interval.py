@@ -252,10 +252,7 @@ PI: Final = Interval(np.pi, np.nextafter(np.pi, np.inf))  # float pi lies below 
 
 
 def _widened(lo: Array, hi: Array) -> Interval:
-    return Interval(
-        lo - (_LIBRARY_ERROR * np.abs(lo) + _TINY),
-        hi + (_LIBRARY_ERROR * np.abs(hi) + _TINY),
-    )
+    return Interval(lo - (_LIBRARY_ERROR * np.abs(lo) + _TINY), hi + (_LIBRARY_ERROR * np.abs(hi) + _TINY))
 
 
 def sqrt(a: Interval) -> Interval:

@@ -147,10 +147,7 @@ class _Branches:
         (inside,) = self._arguments.at(lo[:, columns], hi[:, columns])
         low, high = inside.lo[:, :, 0], inside.hi[:, :, 0]
         known = ~(np.isnan(low) | np.isnan(high))
-        there = {
-            1: (high > 0) | (low >= 0) | ~known,
-            -1: (low < 0) | (high <= 0) | ~known,
-        }
+        there = {1: (high > 0) | (low >= 0) | ~known, -1: (low < 0) | (high <= 0) | ~known}
         for signs, norm in self._norms:
             rows = np.flatnonzero(np.all([there[s][:, k] for k, s in enumerate(signs)], axis=0))
             if not len(rows):
@@ -177,10 +174,7 @@ class Lipschitz:
     """
 
     def __init__(
-        self,
-        jacobian: Matrix,
-        levels: Sequence[tuple[Matrix, Sequence[Matrix]]],
-        kinks: Kinks | None = None,
+        self, jacobian: Matrix, levels: Sequence[tuple[Matrix, Sequence[Matrix]]], kinks: Kinks | None = None
     ) -> None:
         self._branches = None if kinks is None else _Branches(kinks)
         self._gains = [len(gains) for _, gains in levels]

@@ -99,10 +99,7 @@ class SectionData(ABC):
 def margin_data(margin: Interval) -> Constant:
     """A margin as it is written: no bound where it is beyond all use."""
     low, high = float(margin.lo), float(margin.hi)
-    return Constant(
-        below=low if abs(low) < _BEYOND else -inf,
-        above=high if abs(high) < _BEYOND else inf,
-    )
+    return Constant(below=low if abs(low) < _BEYOND else -inf, above=high if abs(high) < _BEYOND else inf)
 
 
 def missing_data(shortfalls: Iterable[Shortfall]) -> tuple[Missing, ...]:

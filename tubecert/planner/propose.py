@@ -122,9 +122,7 @@ def _planned(
 ) -> tuple[tuple[Fraction, ...], ...]:
     """The inputs at the planner's knots; raises `SpecError` if it finds none."""
     proposal = ilqr.plan(
-        dynamics,
-        _problem(course, dynamics),
-        report and (lambda i, cost: report(_step(i, cost))),
+        dynamics, _problem(course, dynamics), report and (lambda i, cost: report(_step(i, cost)))
     )
     if proposal.outcome is not ilqr.Outcome.FOUND:
         raise SpecError([_failure(spec, proposal)])

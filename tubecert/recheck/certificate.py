@@ -67,16 +67,7 @@ def read_result(node: Node) -> Result:
         "declared",
         "reasons",
         "proof",
-        optional=(
-            "synthesis",
-            "metric",
-            "clearance",
-            "inputs",
-            "constants",
-            "tube",
-            *KEYS,
-            "decided_by",
-        ),
+        optional=("synthesis", "metric", "clearance", "inputs", "constants", "tube", *KEYS, "decided_by"),
     )
     verdict = own["verdict"].word(*VERDICTS)
     spec = own["spec"].closed("effective", "effective_hash", "file_hash")
@@ -194,8 +185,7 @@ def _declared(node: Node) -> dict[str, Fraction]:
 
 def _metric(node: Node, n: int) -> MetricSection:
     return node.record(
-        MetricSection,
-        dual_metric=lambda item: tuple(tuple(e.text() for e in row) for row in item.rows(n, n)),
+        MetricSection, dual_metric=lambda item: tuple(tuple(e.text() for e in row) for row in item.rows(n, n))
     )
 
 

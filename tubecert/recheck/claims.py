@@ -120,10 +120,7 @@ def _tube(case: Case) -> Iterator[Claim]:
     lower, upper = case.bound_if_any("lower"), case.bound_if_any("upper")
     if isinstance(trajectory, Planned):
         yield Claim(
-            "the plan serves its task",
-            (*case.whole, case.knots),
-            lambda: serves(trajectory, plan),
-            SHARP,
+            "the plan serves its task", (*case.whole, case.knots), lambda: serves(trajectory, plan), SHARP
         )
     yield Claim(
         f"rho = {float(place.rho):.6g} is large enough",

@@ -70,10 +70,7 @@ def _rescaled(name: str, tube: TubeSection | None) -> bool:
 
 
 def _tube(tube: TubeSection, spec: Specification) -> Iterator[tuple[bool, str]]:
-    for name, own, given in (
-        ("epsilon", tube.epsilon, spec.epsilon),
-        ("rho_a", tube.rho_a, spec.rho_a),
-    ):
+    for name, own, given in (("epsilon", tube.epsilon, spec.epsilon), ("rho_a", tube.rho_a, spec.rho_a)):
         # within half-widths, rho_a may be more than there is room for
         asked = given is not None and not (name == "rho_a" and spec.half_widths and own < given)
         yield own == given if asked else own > 0, f"tube.{name} is not that of the specification"
@@ -89,10 +86,7 @@ def _tube(tube: TubeSection, spec: Specification) -> Iterator[tuple[bool, str]]:
 
 def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
     given, spec, sections = result.overrides, result.specification, result.sections
-    for name, own, value in (
-        ("epsilon", given.epsilon, spec.epsilon),
-        ("rho_a", given.rho_a, spec.rho_a),
-    ):
+    for name, own, value in (("epsilon", given.epsilon, spec.epsilon), ("rho_a", given.rho_a, spec.rho_a)):
         yield own in (None, value), f"overrides.{name} is not what spec.effective has"
     for path, (set_, had) in given.settings.items():
         yield set_ == had, f"overrides.settings.{path} is not what spec.effective has"

@@ -13,7 +13,7 @@ from fractions import Fraction
 from tubecert.recheck.balls import ceiling, exact, root, sharp_norm
 from tubecert.recheck.boxes import Test
 from tubecert.recheck.coordinates import Fields
-from tubecert.recheck.cover import Boxed, Outcome, prove, stated, together
+from tubecert.recheck.cover import Boxed, Outcome, in_turn, prove, stated, together
 from tubecert.recheck.curve import Everyone
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.lipschitz import LipschitzBelow, norms_below, slopes_below
@@ -317,15 +317,13 @@ def largest_push(B: Fraction | None, upper: Fraction | None) -> Fraction | None:
 
 def contained(place: Place) -> Outcome:
     """Assumption 1: x* stays at least rho, or its half-width, away from every face of the safe set."""
-    s, outcomes = place.system, []
+    s = place.system
     sides = (place.rho,) * len(s.states) if place.sides is None else place.sides
+    rooms = []
     for name, side, x in zip(s.states, sides, place.curve.x, strict=True):
         low, high = s.safe_set[name]
-        for room in (number(high - side) - x, x - number(low + side)):
-            outcomes.append(place.along(lambda room=room: NotNegative(room, place.numbers)))  # type: ignore[misc]
-            if not outcomes[-1].holds:
-                return together(outcomes)
-    return together(outcomes)
+        rooms += [number(high - side) - x, x - number(low + side)]
+    return in_turn(place.along(lambda room=room: NotNegative(room, place.numbers)) for room in rooms)  # type: ignore[misc]
 
 
 def half_width(place: Place, row: Sequence[Fraction], width: Fraction, lower: Fraction) -> Outcome:

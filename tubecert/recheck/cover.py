@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -97,6 +97,16 @@ def together(outcomes: Sequence[Outcome]) -> Outcome:
             if item.verdict == verdict:
                 return Outcome(verdict=verdict, why=item.why, boxes=boxes)
     return Outcome(verdict="confirmed", boxes=boxes)
+
+
+def in_turn(outcomes: Iterable[Outcome]) -> Outcome:
+    """Several claims as one, each examined only if those before it hold."""
+    found: list[Outcome] = []
+    for item in outcomes:
+        found.append(item)
+        if not item.holds:
+            break
+    return together(found)
 
 
 def stated(holds: bool, why: str) -> Outcome:

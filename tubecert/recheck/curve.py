@@ -171,11 +171,7 @@ def _hull(boxes: Sequence[Ends]) -> Ends:
 
 
 def expressed(
-    x: Sequence[Term],
-    u: Sequence[Term],
-    time: str,
-    horizon: Fraction | None,
-    period: Ball | None = None,
+    x: Sequence[Term], u: Sequence[Term], time: str, horizon: Fraction | None, period: Ball | None = None
 ) -> Curve:
     """A curve given by terms of `time`; only a point needs no horizon (`ValueError`).
 

@@ -16,7 +16,7 @@ from flint import arb, arb_mat
 from tubecert.recheck.balls import Ball, exact, spectral_norm
 from tubecert.recheck.boxes import Box, Field, Found
 from tubecert.recheck.coordinates import Fields
-from tubecert.recheck.cover import Outcome, prove, stated, together
+from tubecert.recheck.cover import Outcome, in_turn, prove, stated
 from tubecert.recheck.curve import Segment
 from tubecert.recheck.place import Place
 from tubecert.recheck.terms import all_zero
@@ -56,12 +56,10 @@ def unique(place: Place, limit: Fraction) -> Outcome:
 
 def _below(place: Place, shares: Sequence[Fraction], budget: int) -> Outcome:
     """|Gamma| and |dGamma| are at most their shares of the bound."""
-    outcomes: list[Outcome] = []
-    for order, share in enumerate(shares):
-        outcomes.append(prove(SymbolsBelow(place.fields, order, share), place.tube(), budget))
-        if not outcomes[-1].holds:
-            break
-    return together(outcomes)
+    return in_turn(
+        prove(SymbolsBelow(place.fields, order, share), place.tube(), budget)
+        for order, share in enumerate(shares)
+    )
 
 
 def _sampled(test: SymbolsBelow, place: Place) -> float:

@@ -12,7 +12,7 @@ from flint import arb
 from tubecert.recheck.around import Ellipsoid, Round
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.coordinates import Coordinates, Fields
-from tubecert.recheck.cover import Boxed, Outcome, prove, together
+from tubecert.recheck.cover import Boxed, Outcome, in_turn, prove
 from tubecert.recheck.curve import CLOCK, SINCE, Curve, Part, expressed
 from tubecert.recheck.specified.numbers import TIME, Numbers
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
@@ -86,22 +86,16 @@ class Place:
     def beside_plan(self, rows: Rows, limit: Fraction) -> Outcome:
         """|G| <= limit in s and in x - x*, on every part of the plan."""
         whole = NormsBelow([self.around_plan(rows)], limit, self.numbers)
-        outcomes: list[Outcome] = []
-        for part in self.curve.parts:
-            outcomes.append(prove(whole.with_values(part.values), self._ball_of(part), self.budget))
-            if not outcomes[-1].holds:
-                break
-        return together(outcomes)
+        return in_turn(
+            prove(whole.with_values(part.values), self._ball_of(part), self.budget)
+            for part in self.curve.parts
+        )
 
     def _ball_of(self, part: Part) -> Tube:
         """The tube around one part, in its s and in x - x*."""
         nothing = [number(0)] * len(self.system.states)
         return Tube(
-            expressed(nothing, (), TIME, None),
-            self.around,
-            self._offsets,
-            (),
-            {CLOCK: (arb(0), part.length)},
+            expressed(nothing, (), TIME, None), self.around, self._offsets, (), {CLOCK: (arb(0), part.length)}
         )
 
     @property
@@ -111,14 +105,14 @@ class Place:
     def along(self, test: Callable[[], NormsBelow | PositiveDefinite | NotNegative]) -> Outcome:
         """A test in s on every part of the plan."""
         whole = test()
-        outcomes: list[Outcome] = []
-        for part in self.curve.parts:
-            own = whole.with_values(part.values)
-            domain = Boxed({CLOCK: (arb(0), part.length), **self.curve.ranges})
-            outcomes.append(prove(own, domain, self.budget))
-            if not outcomes[-1].holds:
-                break
-        return together(outcomes)
+        return in_turn(
+            prove(
+                whole.with_values(part.values),
+                Boxed({CLOCK: (arb(0), part.length), **self.curve.ranges}),
+                self.budget,
+            )
+            for part in self.curve.parts
+        )
 
     @property
     def numbers(self) -> dict[str, Ball]:

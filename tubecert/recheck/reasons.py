@@ -116,17 +116,9 @@ _CLAIMS: Mapping[str, Form] = {
     "obstacle_cleared": ({"obstacle": Node.count, "clearance": enclosure}, {}),
     "input_within_limits": (
         {"input": Node.text, "side": _SIDE, "limit": Node.decimal, "plan": maybe},
-        {
-            "section": Node.text,
-            "reaches": Node.number,
-            "feedback": Node.number,
-            "adaptation": Node.number,
-        },
+        {"section": Node.text, "reaches": Node.number, "feedback": Node.number, "adaptation": Node.number},
     ),
-    "gains_suffice": (
-        {"section": Node.text, "margins": _margins},
-        {"predictor_gain": Node.decimal},
-    ),
+    "gains_suffice": ({"section": Node.text, "margins": _margins}, {"predictor_gain": Node.decimal}),
     "condition_holds": (
         {"section": Node.text, "condition": Node.text},
         {

@@ -100,12 +100,7 @@ def recheck(
                 heard(found[-1])
             if to_first_failure and not found[-1].outcome.holds:
                 break
-    return Recheck(
-        stated=stated_verdict,
-        hash=stated_hash,
-        claims=tuple(found),
-        unread=unread,
-    )
+    return Recheck(stated=stated_verdict, hash=stated_hash, claims=tuple(found), unread=unread)
 
 
 def _read(document: Node, budget: int) -> tuple[str, str, tuple[str, ...], Callable[[], Iterator[Claim]]]:

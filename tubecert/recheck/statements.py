@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from fractions import Fraction
+from typing import Self
 
 from flint import arb, arb_mat
 
@@ -18,7 +20,19 @@ from tubecert.recheck.quotients import cancelled
 from tubecert.recheck.terms import Rows, Term
 
 
-class NormsBelow:
+class _OnField:
+    """A statement about the terms of a field, with numbers for names that are no variables."""
+
+    _field: Field
+
+    def with_values(self, values: Values) -> Self:
+        """The same with other numbers for the same names."""
+        other = copy(self)
+        other._field = self._field.with_values(values)
+        return other
+
+
+class NormsBelow(_OnField):
     """sum_k |G_k(x)| <= limit, spectral norms (of a column: the Euclidean norm)."""
 
     def __init__(self, matrices: Sequence[Rows], limit: Fraction, values: Values | None = None) -> None:
@@ -26,13 +40,6 @@ class NormsBelow:
         self._field = Field([e for g in matrices for row in g for e in row], values)
         self.variables = self._field.variables
         self._limit = exact(limit)
-
-    def with_values(self, values: Values) -> NormsBelow:
-        """The same with other numbers for the same names."""
-        other = NormsBelow.__new__(NormsBelow)
-        other.__dict__.update(self.__dict__)
-        other._field = self._field.with_values(values)
-        return other
 
     def over(self, box: Box) -> Found:
         """The norms of the affine part at its corners, and of the rest."""
@@ -105,7 +112,7 @@ def _long_direction(a: Balls) -> list[float]:
     return v
 
 
-class PositiveDefinite:
+class PositiveDefinite(_OnField):
     """S(x) > 0, with a congruence that makes `unit` (by default S) near the identity at the centre of each box."""
 
     def __init__(self, S: Rows, unit: Rows | None = None, values: Values | None = None) -> None:
@@ -122,13 +129,6 @@ class PositiveDefinite:
     def _inputs(self) -> tuple[str, ...]:
         return (*self.variables, *self._field.values)
 
-    def with_values(self, values: Values) -> PositiveDefinite:
-        """The same with other numbers for the same names."""
-        other = PositiveDefinite.__new__(PositiveDefinite)
-        other.__dict__.update(self.__dict__)
-        other._field = self._field.with_values(values)
-        return other
-
     def over(self, box: Box) -> Found:
         """At every vertex of the expansion, minus what the rest can be."""
         unit = self._unit_at(box)
@@ -137,9 +137,7 @@ class PositiveDefinite:
         )
         own = found[0].value.entries() if unit is None else unit
         T = arb_mat(whitening([[float(x.mid()) for x in row] for row in square(self._n, own).tolist()]))
-        if not all(definite_on(e, T) for e in found):
-            return Found(False, caused, spread)
-        return Found(True)
+        return Found(True) if all(definite_on(e, T) for e in found) else Found(False, caused, spread)
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """Whether S is proven to have a negative eigenvalue at a point."""
@@ -181,20 +179,13 @@ def definite_on(e: Expansion, T: arb_mat) -> bool:
     return all(is_positive(S - drop) for S in moved.corners())
 
 
-class NotNegative:
+class NotNegative(_OnField):
     """e(x) >= 0 for one term."""
 
     def __init__(self, e: Term, values: Values | None = None, *, strict: bool = False) -> None:
         self._field = Field([e], values)
         self.variables = self._field.variables
         self._strict = strict
-
-    def with_values(self, values: Values) -> NotNegative:
-        """The same with other numbers for the same names."""
-        other = NotNegative.__new__(NotNegative)
-        other.__dict__.update(self.__dict__)
-        other._field = self._field.with_values(values)
-        return other
 
     def over(self, box: Box) -> Found:
         """The least corner, minus what the rest can be."""

@@ -181,11 +181,7 @@ class _Synthesis:
         high, _ = self._points(attack.high, attack.contraction[:0])
         fresh = [
             _new(points, old, self.width)
-            for points, old in (
-                (low, program.low),
-                (high, program.high),
-                (contraction, program.contraction),
-            )
+            for points, old in ((low, program.low), (high, program.high), (contraction, program.contraction))
         ]
         if not any(len(points.at) for points in fresh):
             self.gap *= _WIDER

@@ -105,11 +105,7 @@ def _lower_triangle(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def solve(
-    program: ConicProgram,
-    solver: str = "clarabel",
-    *,
-    tolerance: float = 1e-8,
-    iterations: int | None = None,
+    program: ConicProgram, solver: str = "clarabel", *, tolerance: float = 1e-8, iterations: int | None = None
 ) -> ConicSolution:
     """The answer of `solver` (clarabel, scs, or cvxpy:NAME), deterministic on one machine.
 

@@ -118,10 +118,7 @@ def _dictionary(model: ControlAffineModel, degree: int) -> list[Expression]:
 
 
 def _solutions(
-    model: ControlAffineModel,
-    functions: Sequence[Expression],
-    unknowns: Sequence[Unknown],
-    generator: Random,
+    model: ControlAffineModel, functions: Sequence[Expression], unknowns: Sequence[Unknown], generator: Random
 ) -> list[Field]:
     """Fields sum_k c_ki phi_k with b_j(e_i) = sum_l e_l d(b_ji)/dx_l at sampled points, the simplest first."""
     import flint

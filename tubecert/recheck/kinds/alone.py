@@ -79,9 +79,7 @@ class Alone(Kind[AloneSection, NoGains]):
             yield ground.claim("0: what is told of it", (section,), lambda: _told(section, setting))
         if top is not None:
             yield ground.claim(
-                f"0: sup D <= {float(top):.6g} without adaptation",
-                (top,),
-                lambda: _reaches(top, ground),
+                f"0: sup D <= {float(top):.6g} without adaptation", (top,), lambda: _reaches(top, ground)
             )
         if limit is not None:
             yield ground.claim(
