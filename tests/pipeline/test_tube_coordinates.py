@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tubecert.certificate.result import Result
-from tubecert.claims.tube import TubeInSafeSet
+from tubecert.claims.advice import FitTube
+from tubecert.claims.tube import PlanInSafeSet, StartInTube, TubeInSafeSet
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
 from tubecert.simulation.adaptive.attack import cases
@@ -141,6 +142,28 @@ def test_half_widths_that_leave_the_safe_set_are_told_by_state():
     assert isinstance(claim, TubeInSafeSet)
     assert claim.state == "q"
     assert found.tube is None
+    fits = found.reason.relax[0]
+    assert isinstance(fits, FitTube)
+    assert (fits.state, fits.most) == ("q", 0.4)
+
+
+def test_a_start_outside_of_the_half_widths_is_refuted_in_the_units_of_the_state():
+    text = PENDULUM.replace("TUBE", "half_widths: {q: 0.15}") + "initial_state: {box: {q: [-0.3, 0.1]}}\n"
+    found = certify(load_text(text), COARSE)
+    assert found.verdict is Verdict.REFUTED
+    assert found.reason.claim == StartInTube(state="q", off=0.3, half_width=Fraction(3, 20))
+    assert found.reason.at.x == (-0.3, 0.0)
+    assert "q starts 0.3 from the plan, 0.15 outside of the tube" in found.reason.message
+
+
+@pytest.mark.parametrize("tube", ["half_widths: {q: 0.1}", "epsilon: 0.1, rho_a: 0.1, coordinates: identity"])
+def test_a_plan_outside_of_the_safe_set_is_refuted_whatever_the_tube(tube):
+    text = PENDULUM.replace("TUBE", tube).replace("at: [0, 0]", "at: [0.5, 0]")
+    found = certify(load_text(text + "initial_state: {at: [0.5, 0]}\n"), COARSE)
+    assert found.verdict is Verdict.REFUTED
+    assert isinstance(found.reason.claim, PlanInSafeSet)
+    assert (found.reason.claim.state, found.reason.at.x) == ("q", (0.5, 0.0))
+    assert found.reason.claim.excess == pytest.approx(0.1)
 
 
 @pytest.mark.slow

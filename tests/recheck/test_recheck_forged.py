@@ -379,3 +379,21 @@ def test_an_input_is_bounded_by_what_is_certified_alone():
         bounds[ALONE] = {"least": -8.0, "greatest": 8.0, "feedback": 7.0, "adaptation": 0.0}
 
     assert "the verdict follows from the sections" in failed(made, change)
+
+
+def test_a_plan_outside_of_the_safe_set_is_one_in_the_checkers_eyes_too():
+    made = certified(SMALL.replace("safe_set: {x: [-1", "safe_set: {x: [1/2"))
+    assert made["result"]["reasons"][0]["claim"] == "plan_in_safe_set"
+    assert failing(examine(made)) == []
+    forged = respecified(made, lambda s: s["safe_set"].update(x=["-1", "1"]))
+    forged["result"]["safe_set"]["x"] = [-1.0, 1.0]
+    assert [name for name, _ in failing(examine(sealed(forged)))] == ["refuted: plan_in_safe_set"]
+
+
+def test_a_start_outside_of_the_half_widths_is_one_in_the_checkers_eyes_too():
+    narrow = SMALL.replace("epsilon: 0.2, rho_a: 0.1", "half_widths: {x: 0.3}")
+    made = certified(narrow.replace("at: [0.05, 0]", "at: [0.4, 0]"))
+    assert made["result"]["reasons"][0]["claim"] == "start_in_tube"
+    assert failing(examine(made)) == []
+    forged = respecified(made, lambda s: s["initial_state"].update(at=["0.2", "0"]))
+    assert [name for name, _ in failing(examine(sealed(forged)))] == ["refuted: start_in_tube"]

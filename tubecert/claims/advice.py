@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from typing import Final, Literal
@@ -90,6 +90,36 @@ ReduceRadii = _advice("ReduceRadii", "reduce epsilon, rho_a or the initial error
 LeavePlanRoom = _advice("LeavePlanRoom", "plan with more room to the limits")
 ReduceInitialError = _advice("ReduceInitialError", "reduce the initial error")
 EnlargeSafeSet = _advice("EnlargeSafeSet", "enlarge the safe set")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitTube(Relax):
+    """A tube that fits into the safe set: a half-width of `state`, or without one the radii, of `most` in all."""
+
+    most: float
+    state: str | None = None
+
+    def _told(self) -> str:
+        asked = (
+            "epsilon + rho_a and what the start takes" if self.state is None else f"half_widths.{self.state}"
+        )
+        return f"{asked} of at most {down(self.most, 4)} would fit"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasureTube(Relax):
+    """A tube that certifies: within `half_widths`, or where these are none of the same radii in coordinates: auto."""
+
+    half_widths: Mapping[str, Fraction] = field(default_factory=dict)
+    bandwidth: float | None = None
+    adaptation_rate: float | None = None
+
+    def _told(self) -> str:
+        widths = ", ".join(f"{name}: {near(width)}" for name, width in self.half_widths.items())
+        asked = f"half_widths: {{{widths}}}" if widths else "coordinates: auto"
+        gains = {"omega": self.bandwidth, "Gamma": self.adaptation_rate}
+        told = " and ".join(f"{name} = {near(gain, 3)}" for name, gain in gains.items() if gain is not None)
+        return f"tube: {{{asked}}}, which certifies" + (f" with about {told}" if told else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -215,4 +245,4 @@ def _alternatives(items: Sequence[Relax]) -> str:
 def _is_tried(item: Relax) -> bool:
     """Whether it is told what is known to work."""
     known = isinstance(item, ShrinkSafeSet) and item.factor is not None
-    return known or isinstance(item, (HigherDegree, AskForRateUpTo))
+    return known or isinstance(item, (HigherDegree, AskForRateUpTo, MeasureTube))

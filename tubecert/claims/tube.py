@@ -1,4 +1,4 @@
-"""Claims about the tube: its radius, the curve in its middle, the safe set around it."""
+"""Claims about the tube: its radius, the curve in its middle, the safe set around it, the start in it."""
 
 from __future__ import annotations
 
@@ -57,3 +57,35 @@ class TubeInSafeSet(Claim):
         when = "" if reason.at is None or reason.at.t is None else f", at t = {near(reason.at.t)}"
         excess = f", by {near(self.excess, 3)}" if self.excess > 0 else ""
         return f"the tube {lies} the safe set through the {self.side} bound of {self.state}{excess}{when}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanInSafeSet(Claim):
+    """The plan lies in the safe set; it leaves through the bound of `state` on `side`, by `excess`."""
+
+    name: ClassVar[str] = "the plan lies in the safe set"
+    state: str
+    side: Side
+    excess: float
+
+    def _why(self, reason: Reason) -> str:
+        when = "" if reason.at is None or reason.at.t is None else f", at t = {near(reason.at.t)}"
+        by = f"the {self.side} bound of {self.state}, by {near(self.excess, 3)}"
+        return f"the plan itself leaves the safe set through {by}{when}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartInTube(Claim):
+    """The start lies in the tube; in `state` it is `off` from the plan's, and `half_width` is asked for."""
+
+    name: ClassVar[str] = "the start lies in the tube"
+    state: str
+    off: float
+    half_width: Fraction
+
+    def _why(self, reason: Reason) -> str:
+        beyond = near(self.off - float(self.half_width), 3)
+        return (
+            f"{self.state} starts {near(self.off)} from the plan, {beyond} outside of the tube: its half-width is "
+            f"{near(self.half_width)}"
+        )

@@ -14,7 +14,7 @@ from tubecert.certificate.metric_file import MetricFile
 from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SearchData, SynthesisData
 from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Claim, Reason
-from tubecert.claims.tube import PlanBounded
+from tubecert.claims.tube import PlanBounded, PlanInSafeSet, StartInTube
 from tubecert.pipeline.deadline import Cut
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
@@ -63,7 +63,7 @@ class Row:
     @property
     def missed(self) -> float:
         """How many times the tube the plan misses the dynamics by, where that is why nothing is certified; else 0."""
-        if isinstance(self.claim, PlanBounded):
+        if isinstance(self.claim, PlanBounded | PlanInSafeSet | StartInTube):
             return inf
         return 0.0 if self.counts or self.mend is None else self.mend.share
 

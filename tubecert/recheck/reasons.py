@@ -111,6 +111,8 @@ _CLAIMS: Mapping[str, Form] = {
         {"radius": Node.decimal, "state": Node.text, "side": _SIDE, "excess": Node.number},
         {},
     ),
+    "plan_in_safe_set": ({"state": Node.text, "side": _SIDE, "excess": Node.number}, {}),
+    "start_in_tube": ({"state": Node.text, "off": Node.number, "half_width": Node.decimal}, {}),
     "constant_bounded": ({"constant": Node.text}, {}),
     "uncertainty_bound": ({"constant": Node.text, "declared": Node.number, "reaches": maybe}, {}),
     "obstacle_cleared": ({"obstacle": Node.count, "clearance": enclosure}, {}),

@@ -82,6 +82,10 @@ def _refutation(case: Case, reason: Reason) -> Outcome:
         return _metric_fails(case, name, [exact(value) for value in at[1]])
     if name == "tube_in_safe_set" and at is not None:
         return _leaves(case, at[0])
+    if name == "plan_in_safe_set" and at is not None:
+        return _within_none(case, Fraction(0), at[0])
+    if name == "start_in_tube":
+        return _starts_outside(case, str(reason.parameters["state"]))
     if name == "input_within_limits":
         return _plan_exceeds(case, str(reason.parameters["input"]), None if at is None else at[0])
     section = str(reason.parameters.get("section"))
@@ -143,14 +147,31 @@ def _leaves(case: Case, at: Fraction | None) -> Outcome:
         return stated(False, "no radius is stated")
     if case.result.specification.coordinates:
         return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
-    s, own = case.system, _least_radius(case, case.result.tube)
-    rho, family = exact(own), case.result.specification.trajectory
+    return _within_none(case, _least_radius(case, case.result.tube), at)
+
+
+def _within_none(case: Case, own: Fraction, at: Fraction | None) -> Outcome:
+    """The plan, with a ball of radius `own` around it, is beyond a face of the safe set near a time."""
+    s, rho, family = case.system, exact(own), case.result.specification.trajectory
     if isinstance(family, AnyPlan):  # some plan of it is at each face of its box
         pairs = [(family.x[name], s.safe_set[name]) for name in s.states]
         return _if(any(low - own < least or high + own > most for (low, high), (least, most) in pairs))
     _, x, _ = _near(case, at).middle()
     ranges = (s.safe_set[name] for name in s.states)
     return _if(any(v + rho > exact(hi) or v - rho < exact(lo) for v, (lo, hi) in zip(x, ranges, strict=True)))
+
+
+def _starts_outside(case: Case, name: str) -> Outcome:
+    """A state starts farther from the plan's than the half-width that is asked for."""
+    s, asked = case.system, case.result.specification.half_widths
+    if name not in s.states or name not in asked:
+        return stated(False, "no half-width is asked for")
+    if s.within is not None:
+        return _if(s.within > asked[name])
+    i = s.states.index(name)
+    most = exact(asked[name])
+    apart = [Program([start.off_plan(point, case.curve)[i]], ()).run(())[0] for point in start.points(s)]
+    return _if(any(bool(off > most) or bool(-off > most) for off in apart))
 
 
 def _least_radius(case: Case, tube: TubeSection) -> Fraction:

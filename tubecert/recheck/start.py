@@ -50,8 +50,8 @@ def offset(place: Place) -> Ball:
         )
         return stretch * exact(s.within)
     sizes = []
-    for point in _points(s):
-        apart = place.fields.vector([[d] for d in _delta(point, place.curve)])
+    for point in points(s):
+        apart = place.fields.vector([[d] for d in off_plan(point, place.curve)])
         sizes.append(length(Program([d for (d,) in apart], ()).run(())))
     largest = sizes[0]
     for size in sizes[1:]:
@@ -59,7 +59,7 @@ def offset(place: Place) -> Ball:
     return largest
 
 
-def _points(s: System) -> list[Numbers]:
+def points(s: System) -> list[Numbers]:
     """x0, or the corners of the box of starts, where everything that is convex in x(0) is largest."""
     if s.box is None:
         assert s.x0 is not None
@@ -67,7 +67,7 @@ def _points(s: System) -> list[Numbers]:
     return list(product(*(dict.fromkeys(s.box[name]) for name in s.states)))
 
 
-def _delta(x0: Numbers, curve: Curve) -> list[Term]:
+def off_plan(x0: Numbers, curve: Curve) -> list[Term]:
     """x0 - x*(0), exact."""
     return [number(q) - x for q, x in zip(x0, curve.start, strict=True)]
 
@@ -141,7 +141,7 @@ def distance(place: Place, limit: Fraction, upper: Fraction) -> Outcome:
         return upper_bound(s, (limit / s.within) ** 2, place.tube(), place.budget)
     if s.box is not None and not s.flat:
         return _from_centre(place, limit, upper, s.box)
-    for point in _points(s):
+    for point in points(s):
         found = _segment(place, point, limit)
         if not found.holds:
             return found
@@ -155,7 +155,7 @@ def _from_centre(place: Place, limit: Fraction, upper: Fraction, box: dict[str, 
     """
     s = place.system
     sides = [box[name] for name in s.states]
-    delta = _delta(tuple((low + high) / 2 for low, high in sides), place.curve)
+    delta = off_plan(tuple((low + high) / 2 for low, high in sides), place.curve)
     first = arb(0)
     if not all(d is NOUGHT for d in delta):
         _, first = _Speed(s, place.curve, delta).over_pieces(_PIECES[-2])
@@ -175,7 +175,7 @@ def _from_centre(place: Place, limit: Fraction, upper: Fraction, box: dict[str, 
 def _segment(place: Place, point: Numbers, limit: Fraction) -> Outcome:
     """The segment from x*(0) to one point."""
     s = place.system
-    delta = _delta(point, place.curve)
+    delta = off_plan(point, place.curve)
     if all(d is NOUGHT for d in delta):
         return stated(limit >= 0, "it is negative")
     speed = _Speed(s, place.curve, delta)

@@ -8,6 +8,8 @@ from fractions import Fraction
 from functools import cached_property
 from math import isfinite
 
+import numpy as np
+
 from tubecert.bounds.compute import Radius, least_radius
 from tubecert.bounds.constants import Witness
 from tubecert.bounds.level import Proposed, greatest_level, least_level
@@ -15,12 +17,12 @@ from tubecert.bounds.suprema import Suprema
 from tubecert.claims.advice import (
     DeclareMetricBound,
     EnlargeSafeSet,
+    FitTube,
     RaiseBudget,
     ReduceInitialError,
-    ReduceRadii,
 )
-from tubecert.claims.family import Claim, Side
-from tubecert.claims.tube import PlanBounded, TubeInSafeSet, TubeRadius
+from tubecert.claims.family import Claim, Relax, Side
+from tubecert.claims.tube import PlanBounded, PlanInSafeSet, StartInTube, TubeInSafeSet, TubeRadius
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.enclosure.interval import Interval, sqrt
@@ -132,6 +134,8 @@ def find_tube(planned: Planned, proposed: tuple[Coordinates, Proposed] | None = 
     question = planned.question
     if question.spec.tube.auto != (proposed is not None):
         raise ValueError("coordinates are proposed where the specification asks for them, and nowhere else")
+    if (outside := _start_outside(planned)) is not None:
+        return outside
     coordinates = None if proposed is None else proposed[0]
     suprema = replace(question.suprema(planned.plan), coordinates=coordinates)
     wanted = None if proposed is None else proposed[1]
@@ -149,12 +153,13 @@ def find_tube(planned: Planned, proposed: tuple[Coordinates, Proposed] | None = 
     contained = radius.contained
     if contained.verdict is not Verdict.CERTIFIED or radius.lower is None or radius.upper is None:
         # half-widths are bounds of what the tube reaches: one that leaves the safe set refutes nothing
+        refutes = coordinates is None or contained.outside
         return stopped(
             planned,
             _claim(radius),
-            Verdict.UNDECIDED if coordinates is not None else contained.verdict,
+            contained.verdict if refutes else Verdict.UNDECIDED,
             where=Witness(t=contained.t, x=contained.x),
-            relax=(ReduceRadii(), EnlargeSafeSet()),
+            relax=(*_fitting(question, radius), EnlargeSafeSet()),
             partial=radius,
         )
     return TubeFound(
@@ -212,4 +217,42 @@ def _claim(radius: Radius) -> Claim:
     if not contained.state:
         return PlanBounded()
     side: Side = "upper" if contained.side == "upper" else "lower"
+    if contained.outside:
+        return PlanInSafeSet(state=contained.state, side=side, excess=contained.excess)
     return TubeInSafeSet(radius=radius.rho, state=contained.state, side=side, excess=contained.excess)
+
+
+def _fitting(question: Question, radius: Radius) -> tuple[Relax, ...]:
+    """The tube that would fit where the plan has room: by its half-width, or by its radii."""
+    contained, asked = radius.contained, dict(question.spec.tube.half_widths)
+    if not contained.state or contained.outside or contained.room <= 0:
+        return ()
+    if contained.state in asked:
+        return (FitTube(state=contained.state, most=contained.room),)
+    if asked:
+        return ()
+    side = radius.rho if radius.sides is None else radius.sides[question.spec.states.index(contained.state)]
+    return (FitTube(most=contained.room * float(radius.rho / side)),)
+
+
+def _start_outside(planned: Planned) -> Stopped | None:
+    """A start that is farther from the plan's than a half-width that is asked for, in the state where it is most."""
+    question = planned.question
+    spec, asked = question.spec, dict(question.spec.tube.half_widths)
+    ends = spec.start_box or tuple((value, value) for value in spec.x0)
+    centre, _ = planned.plan.enclose(np.zeros(1), np.zeros(1))
+    worst: tuple[Fraction, str, Witness] | None = None
+    for i, name in enumerate(spec.states):
+        if name not in asked or not np.isfinite([centre.lo[0, i], centre.hi[0, i]]).all():
+            continue
+        low, high = Fraction(float(centre.lo[0, i])), Fraction(float(centre.hi[0, i]))
+        for apart, end in ((ends[i][1] - high, 1), (low - ends[i][0], 0)):
+            off = apart if spec.within is None else spec.within
+            at = Witness(t=0.0, x=tuple(float(pair[end]) for pair in ends) if spec.within is None else ())
+            if off > asked[name] and (worst is None or off / asked[name] > worst[0] / asked[worst[1]]):
+                worst = off, name, at
+    if worst is None:
+        return None
+    off, name, at = worst
+    claim = StartInTube(state=name, off=float(off), half_width=asked[name])
+    return stopped(planned, claim, Verdict.REFUTED, where=at, relax=(ReduceInitialError(),))

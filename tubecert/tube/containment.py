@@ -17,7 +17,10 @@ from tubecert.verdict import Verdict
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Containment:
-    """Whether the tube lies in the safe set (assumption 1): certified, refuted with place and time, or undecided."""
+    """Whether the tube lies in the safe set (assumption 1): certified, refuted with place and time, or undecided.
+
+    `outside`: so does the plan itself not, by `excess`; else the tube is too wide by it, and has `room`.
+    """
 
     verdict: Verdict = Verdict.UNDECIDED
     state: str = ""
@@ -25,6 +28,8 @@ class Containment:
     t: float = 0.0
     x: tuple[float, ...] = ()
     excess: float = 0.0
+    room: float = 0.0
+    outside: bool = False
 
 
 def containment(
@@ -40,7 +45,7 @@ def containment(
     """
     sides = (sides,) * len(states) if isinstance(sides, Fraction) else tuple(sides)
     if not plan.defined:
-        return _knots_outside(plan, sides, states, safe_set)
+        return _knots_outside(plan, states, safe_set)
     undecided: Containment | None = None
     worst: Containment | None = None
     for i, (name, radius, (lowest, highest)) in enumerate(zip(states, sides, safe_set, strict=True)):
@@ -66,14 +71,18 @@ def containment(
             place = here.mid[0].copy()
             if plan.allowance is not None:  # the member that comes nearest
                 place[i] = sign * float(low)
-            place[i] += sign * float(radius)
+            outside = low > limit
+            if not outside:
+                place[i] += sign * float(radius)
             case = Containment(
                 verdict=Verdict.REFUTED if low + radius > limit else Verdict.UNDECIDED,
                 state=name,
                 side=side,
                 t=t,
                 x=tuple(float(value) for value in place),
-                excess=float(low + radius - limit),
+                excess=float(low - limit if outside else low + radius - limit),
+                room=float(limit - high),
+                outside=outside,
             )
             if case.verdict is Verdict.REFUTED and (worst is None or case.excess > worst.excess):
                 worst = case
@@ -83,12 +92,9 @@ def containment(
 
 
 def _knots_outside(
-    plan: Plan,
-    sides: Sequence[Fraction],
-    states: tuple[str, ...],
-    safe_set: tuple[tuple[Fraction, Fraction], ...],
+    plan: Plan, states: tuple[str, ...], safe_set: tuple[tuple[Fraction, Fraction], ...]
 ) -> Containment:
-    """The knot that is farthest from being allowed, for a curve whose slopes are not defined everywhere.
+    """The knot that is farthest outside, for a curve whose slopes are not defined everywhere.
 
     Inside the safe set they are, so that a knot outside is to be expected. Knots beyond the horizon shape the last
     piece only: the curve need not reach them.
@@ -99,17 +105,16 @@ def _knots_outside(
     for t, x in reached:
         if plan.horizon is not None and t > plan.horizon:
             break
-        for i, (name, radius, (lowest, highest)) in enumerate(zip(states, sides, safe_set, strict=True)):
-            for side, sign, excess in (("upper", 1, x[i] - highest), ("lower", -1, lowest - x[i])):
-                if excess + radius > worst.excess:
-                    place = [float(value) for value in x]
-                    place[i] += sign * float(radius)
+        for name, value, (lowest, highest) in zip(states, x, safe_set, strict=True):
+            for side, excess in (("upper", value - highest), ("lower", lowest - value)):
+                if excess > worst.excess:
                     worst = Containment(
                         verdict=Verdict.REFUTED,
                         state=name,
                         side=side,
                         t=float(t),
-                        x=tuple(place),
-                        excess=float(excess + radius),
+                        x=tuple(float(value) for value in x),
+                        excess=float(excess),
+                        outside=True,
                     )
     return worst
