@@ -13,11 +13,9 @@ from hypothesis import strategies as st
 import tubecert
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import PlanRemedy
-from tubecert.claims.failures import Failure
+from tubecert.claims.failures import Failure, Outcome
 from tubecert.claims.family import Assumption, Claim, Relax
-from tubecert.claims.metric import MetricContraction
-from tubecert.claims.outcomes import Outcome
-from tubecert.claims.tube import TubeInSafeSet
+from tubecert.claims.statements import MetricContraction, TubeInSafeSet
 from tubecert.records import FormError, to_json
 from tubecert.verdict import Verdict
 

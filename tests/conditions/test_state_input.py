@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tubecert.claims.metric import MetricKilling
+from tubecert.claims.statements import MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.projected import ProjectedPencil

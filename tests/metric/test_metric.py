@@ -25,7 +25,7 @@ from systems import (
 )
 
 from tubecert.claims.family import Reason
-from tubecert.claims.metric import MetricContraction, MetricDefinite, MetricKilling
+from tubecert.claims.statements import MetricContraction, MetricDefinite, MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import constant, substitute
 from tubecert.metric import verify

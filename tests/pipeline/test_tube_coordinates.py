@@ -9,7 +9,7 @@ import pytest
 
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import FitTube
-from tubecert.claims.tube import PlanInSafeSet, StartInTube, TubeInSafeSet
+from tubecert.claims.statements import PlanInSafeSet, StartInTube, TubeInSafeSet
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
 from tubecert.simulation.adaptive.attack import cases

@@ -50,7 +50,7 @@ def test_figures_are_images_in_which_nothing_runs(made):
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"outcome": 1, "certificate": 2}', "[" * 100_000])
 def test_a_folder_that_holds_none_is_refused(made, text):
     (made / "plant.simulation" / "summary.json").write_text(text)
-    with pytest.raises(TargetError, match="no simulation|another certificate"):
+    with pytest.raises(TargetError, match=r"no simulation|another certificate"):
         tc.report(made / "plant.json", simulation=made / "plant.simulation")
 
 

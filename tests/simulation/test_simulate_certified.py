@@ -12,7 +12,7 @@ from tubecert import asking, pipeline
 from tubecert.certificate import dump, seal
 from tubecert.certificate.belonging import compared
 from tubecert.claims.family import Reason
-from tubecert.claims.metric import MetricDefinite
+from tubecert.claims.statements import MetricDefinite
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.letters import ADAPTIVE, name_of, words_of
 from tubecert.library.certification import read as read_file

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from tubecert import pipeline
 from tubecert.claims.advice import ConstantInputs
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
-from tubecert.claims.tube import TubeInSafeSet
+from tubecert.claims.statements import TubeInSafeSet
 from tubecert.cli.app import app
 from tubecert.expression import scan
 from tubecert.model import build

@@ -8,8 +8,7 @@ from typer.testing import CliRunner
 
 from tubecert import pipeline
 from tubecert.claims.advice import CorrectPlan, MendPlan
-from tubecert.claims.gains import ConditionHolds
-from tubecert.claims.tube import PlanBounded
+from tubecert.claims.statements import ConditionHolds, PlanBounded
 from tubecert.cli.app import app
 from tubecert.model import build
 from tubecert.pipeline import Options

@@ -13,7 +13,7 @@ from systems import plain_model as model
 from typer.testing import CliRunner
 
 from tubecert.claims.failures import VariableForbidden
-from tubecert.claims.metric import MetricContraction
+from tubecert.claims.statements import MetricContraction
 from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import round_down

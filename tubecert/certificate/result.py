@@ -14,8 +14,8 @@ from typing import Any, Literal
 from tubecert.bounds.clearance import Shape
 from tubecert.certificate.effective import Asked, Effective
 from tubecert.certificate.notes import joined, split
+from tubecert.claims.failures import Outcome
 from tubecert.claims.family import Assumption, Reason
-from tubecert.claims.outcomes import Outcome
 from tubecert.conditions.inputs import InputBound
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness

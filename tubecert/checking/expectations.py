@@ -11,8 +11,7 @@ from tubecert.certificate.result import Result
 from tubecert.claims.advice import advice
 from tubecert.claims.conditions import SECTIONS
 from tubecert.claims.family import Reason
-from tubecert.claims.limits import input_title
-from tubecert.claims.metric import METRIC_CLAIMS, MetricFound
+from tubecert.claims.statements import METRIC_CLAIMS, MetricFound, input_title
 from tubecert.digits import near
 from tubecert.enclosure.constant import Constant
 from tubecert.expression import number_text

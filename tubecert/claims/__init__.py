@@ -6,9 +6,9 @@ parameters are a contract: a reader of certificates decides by them, never by a 
 | module | what it holds |
 |---|---|
 | `family` | what a claim, an advice, an assumption and a reason are |
-| `metric`, `tube`, `bounds`, `gains`, `limits` | claims, in the order in which a certification meets them |
+| `statements` | claims, in the order in which a certification meets them |
 | `conditions` | what the conditions of certificates are called and say |
-| `failures`, `outcomes` | why no metric was found, and what became of each attempt |
+| `failures` | why no metric was found, and what became of each attempt |
 | `advice` | what would help |
 | `assumptions` | what is assumed |
 | `written` | points and enclosures as JSON |
@@ -16,5 +16,5 @@ parameters are a contract: a reader of certificates decides by them, never by a 
 
 # All of them, in this order, wherever one is read: a family of records is whole only when its members are loaded.
 from tubecert.claims import (  # noqa: F401  # isort: skip
-    metric, tube, bounds, gains, limits, failures, outcomes, advice, assumptions, written,
+    statements, failures, advice, assumptions, written,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Why no metric was found."""
+"""Why no metric was found, and what became of each attempt to find one."""
 
 from __future__ import annotations
 
@@ -6,12 +6,63 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from tubecert.claims.family import Claim, Reason
-from tubecert.claims.outcomes import Outcome
+from tubecert.claims.family import Claim, Reason, Said, plain
 from tubecert.digits import near
 from tubecert.records import Tagged
 from tubecert.spec.codes import title
 from tubecert.verdict import Verdict
+
+
+class Outcome(Said, Tagged):
+    """What a route came to; all but `Proven` are why there is no metric by it."""
+
+    __slots__ = ()
+
+
+Proven = plain(__name__, Outcome, "Proven", "proven")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoProposal(Outcome):
+    """The route proposed nothing; `status` is what its solver said."""
+
+    route: str
+    status: str
+
+    def _told(self) -> str:
+        return f"{self.route}: {self.status}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WrongShape(Outcome):
+    """The route proposed coefficients of a wrong shape."""
+
+    route: str
+
+    def _told(self) -> str:
+        return f"{self.route} gave coefficients of a wrong shape"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NotProven(Outcome):
+    """The proposal, rounded, could not be proven, or is refuted: `condition` failed."""
+
+    route: str
+    condition: Claim
+    verdict: Verdict
+
+    def _told(self) -> str:
+        return f"{self.route}: {Reason(claim=self.condition, verdict=self.verdict).message}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConditionUnbounded(Outcome):
+    """The condition number of what was proposed could not be bounded."""
+
+    route: str
+
+    def _told(self) -> str:
+        return f"{self.route}: the condition number could not be bounded"
 
 
 class Failure(Tagged):

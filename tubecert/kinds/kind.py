@@ -15,7 +15,7 @@ from fractions import Fraction
 from math import inf, isfinite
 from typing import ClassVar, Generic, Literal
 
-from tubecert.claims.gains import GainsSuffice
+from tubecert.claims.statements import GainsSuffice
 from tubecert.conditions.inputs import InputBound, LimitedInput
 from tubecert.conditions.problem import Shortfall, TubeProblem
 from tubecert.conditions.theorem import LoopGains, Proposal, R, Theorem

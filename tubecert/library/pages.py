@@ -108,7 +108,9 @@ def _simulated_in(folder: str, certificate: AnyCertificate) -> Simulated:
     kind = files.Kind(most=_MOST, unreadable="TC600", too_large="TC600", help=_HELP)
     try:
         summary = json.loads(files.read(os.path.join(folder, "summary.json"), kind))
-        outcome, of = str(summary["outcome"]), summary["certificate"]
+        outcome, of = summary["outcome"], summary["certificate"]
+        if not isinstance(outcome, str) or not isinstance(of, str):
+            raise TypeError
     except (ValueError, RecursionError, KeyError, TypeError):
         raise _refused("TC601", f"{folder} holds no simulation of tubecert") from None
     if of != certificate.hash:

@@ -15,7 +15,7 @@ from math import isfinite
 
 import numpy as np
 
-from tubecert.claims.metric import MetricContraction, MetricDefinite, MetricKilling
+from tubecert.claims.statements import MetricContraction, MetricDefinite, MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort, Supremum, decide, supremum
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import BoxDomain

@@ -16,7 +16,7 @@ from math import inf, log2, sqrt
 import numpy as np
 
 from tubecert.certificate.result import RateLimit, RateLimits
-from tubecert.claims.tube import TubeInSafeSet, TubeRadius
+from tubecert.claims.statements import TubeInSafeSet, TubeRadius
 from tubecert.enclosure.constant import round_down
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel

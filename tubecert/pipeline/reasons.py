@@ -20,8 +20,7 @@ from tubecert.claims.advice import (
     ShrinkTube,
 )
 from tubecert.claims.family import Reason, Relax
-from tubecert.claims.gains import ConditionHolds
-from tubecert.claims.limits import InputWithinLimits, ObstacleCleared
+from tubecert.claims.statements import ConditionHolds, InputWithinLimits, ObstacleCleared
 from tubecert.conditions.inputs import InputBound, JudgedInput, LimitedInput
 from tubecert.conditions.problem import Shortfall
 from tubecert.enclosure.constant import Constant, Witness

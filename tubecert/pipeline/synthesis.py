@@ -32,8 +32,7 @@ from tubecert.claims.failures import (
     RankUnproven,
 )
 from tubecert.claims.family import Reason, Relax
-from tubecert.claims.metric import MetricFound
-from tubecert.claims.tube import TubeInSafeSet
+from tubecert.claims.statements import MetricFound, TubeInSafeSet
 from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness, round_down

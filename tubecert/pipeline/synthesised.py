@@ -14,7 +14,7 @@ from tubecert.certificate.metric_file import MetricFile
 from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SearchData, SynthesisData
 from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Claim, Reason
-from tubecert.claims.tube import PlanBounded, PlanInSafeSet, StartInTube
+from tubecert.claims.statements import PlanBounded, PlanInSafeSet, StartInTube
 from tubecert.pipeline.deadline import Cut
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data

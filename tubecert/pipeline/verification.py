@@ -14,7 +14,7 @@ from tubecert.certificate.metric_file import MetricFile, metric_file
 from tubecert.certificate.result import SolverData
 from tubecert.certificate.sections import metric_data
 from tubecert.claims.family import Reason
-from tubecert.claims.metric import MetricContraction, RankOfB
+from tubecert.claims.statements import MetricContraction, RankOfB
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.interval import Interval

@@ -12,7 +12,7 @@ from tubecert.certificate.result import Result, TubeData
 from tubecert.claims import family as claims
 from tubecert.claims.advice import advice
 from tubecert.claims.conditions import SAYS, equation
-from tubecert.claims.gains import GainsSuffice
+from tubecert.claims.statements import GainsSuffice
 from tubecert.digits import down, exact, short, up
 from tubecert.kinds import ALONE, DISTANCE, RATES
 from tubecert.kinds.alone import AloneData

@@ -13,7 +13,7 @@ from math import isfinite
 from tubecert.bounds.constants import EVERY, meaning
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
 from tubecert.claims.conditions import SAYS, SHOWN, condition_name, equation
-from tubecert.claims.limits import InputWithinLimits
+from tubecert.claims.statements import InputWithinLimits
 from tubecert.digits import UNKNOWN, down, exact, short, up
 from tubecert.enclosure.constant import Constant
 from tubecert.records import to_json

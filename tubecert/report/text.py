@@ -32,7 +32,9 @@ Rows = Sequence[tuple[str, str]]
 
 def headline(page: Page) -> Text:
     """The verdict, what it is about, and the numbers or the reason that go with it: one line."""
-    return _led(page, page.summary)
+    led = _led(page, page.summary)
+    led.no_wrap, led.overflow = True, "ignore"
+    return led
 
 
 def screen(page: Page, closing: Rows, *, verbose: bool) -> list[RenderableType]:

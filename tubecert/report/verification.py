@@ -8,7 +8,7 @@ from dataclasses import fields
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from tubecert.claims.metric import MetricKilling
+from tubecert.claims.statements import MetricKilling
 from tubecert.digits import down, end, exact, up
 from tubecert.enclosure.constant import Constant
 from tubecert.printable import printable_json

@@ -16,7 +16,7 @@ from tubecert.bounds.constants import BoundConstants
 from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import residual_constants, wind_constants
 from tubecert.claims.advice import DeclareUncertaintyBound, RaiseBudget, ShrinkTube
-from tubecert.claims.bounds import ConstantBounded, UncertaintyBound
+from tubecert.claims.statements import ConstantBounded, UncertaintyBound
 from tubecert.conditions.inputs import LimitedInput
 from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.coordinates import Coordinates, Fields

@@ -8,7 +8,7 @@ from math import isfinite
 
 from tubecert.claims.advice import DeclareMetricBound, LowerRate, OtherMetric, RaiseBudget
 from tubecert.claims.family import Relax
-from tubecert.claims.metric import MetricBound, MetricContraction, MetricKilling, RankOfB
+from tubecert.claims.statements import MetricBound, MetricContraction, MetricKilling, RankOfB
 from tubecert.enclosure.branch_and_bound import Decision
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.metric.verify import MetricProof

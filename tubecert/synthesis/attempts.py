@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from tubecert.claims.outcomes import Outcome, Proven
+from tubecert.claims.failures import Outcome, Proven
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.metric.verify import Proofs
 from tubecert.model import ControlAffineModel

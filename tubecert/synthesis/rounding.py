@@ -12,7 +12,7 @@ from math import floor, inf, isfinite, log10
 
 import numpy as np
 
-from tubecert.claims.outcomes import ConditionUnbounded, NoProposal, NotProven, Outcome, WrongShape
+from tubecert.claims.failures import ConditionUnbounded, NoProposal, NotProven, Outcome, WrongShape
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
 from tubecert.enclosure.interval import Array, Interval
