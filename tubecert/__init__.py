@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tubecert.errors import SpecError, TargetError, TubecertError
-    from tubecert.library.certification import Certification, Gains
+    from tubecert.library.certification import Certification
     from tubecert.library.certifying import certify
     from tubecert.library.checks import Checked, check
     from tubecert.library.comparing import Comparison, compare
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from tubecert.library.specification import Specification, load, specification
     from tubecert.library.sweeping import Swept, sweep
     from tubecert.progress import Phase, Step, Unit
+    from tubecert.report.gains import Gains
     from tubecert.verdict import Verdict
 
 __all__ = [
@@ -71,7 +72,7 @@ __all__ = [
 
 _HOMES = {
     "Certification": "library.certification",
-    "Gains": "library.certification",
+    "Gains": "report.gains",
     "read": "library.reading",
     "certify": "library.certifying",
     "Checked": "library.checks",

@@ -263,7 +263,7 @@ def test_the_values_are_those_of_the_certificate():
     section = data["conditions_26"]
     assert (result.omega, result.Gamma) == (section["bandwidth"], section["adaptation_rate"])
     assert result.deciding.kind == "A"
-    assert result.deciding.exact.bandwidth == Fraction(str(section["bandwidth"]))
+    assert result.deciding.pair.bandwidth == Fraction(str(section["bandwidth"]))
     assert set(result.margins) == {"26a", "26b", "26c"}
     assert all(low > 0 for low, _ in result.margins.values())
     assert result.rho == data["tube"]["rho"]

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from fractions import Fraction
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -17,43 +16,16 @@ from tubecert.certificate import file
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result
 from tubecert.enclosure.interval import Array
 from tubecert.kinds import name_of
-from tubecert.kinds.kind import Pair, SectionData
+from tubecert.kinds.kind import SectionData
 from tubecert.library.specification import File, Specification
 from tubecert.library.stated import Stated, array, rounded_up
 from tubecert.records import FormError, Json
-from tubecert.report import gains as report_gains
+from tubecert.report.gains import Gains, rows
 from tubecert.report.outline import widths
 from tubecert.report.page import Reason
-from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gains:
-    """One set of gains of one kind of certificate, proven (or not, see `verdict`) on its own: never mix two sets.
-
-    `kind` is its letter; `chosen` says what they are chosen for; `decides`: whether the verdict is about them.
-    `omega` in rad/s and `Gamma` are None where the loop has none of it, and are the decimals that the
-    certificate prints (`exact` has them as fractions). `margins`, by condition: what is proven to be left, from below
-    and from above, as a share of what is allowed.
-    """
-
-    kind: str
-    title: str
-    chosen: str
-    verdict: Verdict
-    decides: bool
-    omega: float | None
-    Gamma: float | None
-    margins: Mapping[str, tuple[float, float]]
-    exact: Pair = field(repr=False)
-
-    @property
-    def certified(self) -> bool:
-        """Whether these gains are proven to suffice."""
-        return self.verdict is Verdict.CERTIFIED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +67,7 @@ class Certification(Stated[Certificate]):
     @property
     def gains(self) -> tuple[Gains, ...]:
         """Every set of gains that was found, of every kind of certificate."""
-        return tuple(map(_gains, report_gains.rows(self.result)))
+        return tuple(rows(self.result))
 
     @property
     def deciding(self) -> Gains | None:
@@ -206,22 +178,3 @@ def read_sealed(sealed: Json, source: str) -> Certification:
 def certification_of(sealed: Json, given: Specification | None = None) -> Certification:
     """A sealed certificate as a value; raises `FormError`."""
     return Certification(certificate=Certificate.from_json(sealed), text=file.dump(sealed), given=given)
-
-
-def _gains(row: report_gains.Gains) -> Gains:
-    pair, name = row.pair, name_of(row.section)
-    return Gains(
-        kind=name.letter,
-        title=name.title,
-        chosen=row.which,
-        verdict=row.verdict,
-        decides=row.decides,
-        omega=_float(pair.bandwidth),
-        Gamma=_float(pair.adaptation_rate),
-        margins=MappingProxyType({name: (m.below, m.above) for name, m in pair.margins.items()}),
-        exact=pair,
-    )
-
-
-def _float(value: Fraction | None) -> float | None:
-    return None if value is None else float(value)

@@ -206,13 +206,10 @@ def verify(
 def at_rate(spec: Spec, rate: Fraction | None) -> Spec:
     """The specification with another rate of its metric, if one is given; raises `SpecError` if it has no metric."""
     if spec.metric is None:
-        from tubecert.findings import Finding, Location, NamedPlace
+        from tubecert.findings import Finding, Location
 
-        place = (Location if asker().options else NamedPlace)(file=spec.path, line=1, column=1)
+        place, message = Location(file=spec.path, line=1, column=1), "there is no metric to verify"
         help = "give a metric file after the specification (tubecert synth finds one), or metric.dual_metric and rate"
-        if not asker().options:
-            help = "give metric.dual_metric and metric.rate, or a metric beside the specification"
-        message = "there is no metric to verify"
         raise SpecError([Finding(code="TC105", message=message, location=place, help=help)])
     return spec if rate is None else replace(spec, metric=replace(spec.metric, rate=rate))
 
@@ -297,6 +294,7 @@ def wanted_of(system: Spec, said: Mapping[str, Any]) -> Synthesis:
     Without a section the rate is that of the specification's own metric. Raises `SpecError` if they do not go together.
     """
     from tubecert.spec import Synthesis
+    from tubecert.spec.metric import solver_name
 
     own = system.synthesis
     if own is None:
@@ -315,27 +313,14 @@ def wanted_of(system: Spec, said: Mapping[str, Any]) -> Synthesis:
         refuse(named("objective"), "rate", text)
     if objective in ("condition", "margin") and rate is None:
         refuse(named("objective"), objective, f"the objective {objective} needs {named('rate')}, in 1/s")
-    known = {"variables": _states(system, said), "solver": _solver(said)}
-    values = {**said, **{name: each for name, each in known.items() if each is not None}}
-    outputs = own.outputs if objective == "tube" else ()
-    return replace(own, **{**values, "rate": rate, "objective": objective, "outputs": outputs})
-
-
-def _solver(said: Mapping[str, Any]) -> str | None:
-    from tubecert.spec.metric import solver_name
-
-    text = said.get("solver")
-    found = None if text is None else solver_name(text)
-    if text is not None and found is None:
+    values = {**said, "rate": rate, "objective": objective}
+    if "solver" in said and (solver := solver_name(said["solver"])) is None:
         known = "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows"
-        refuse(named("solver"), text, known)
-    return found
-
-
-def _states(system: Spec, said: Mapping[str, Any]) -> tuple[str, ...] | None:
-    names: tuple[str, ...] | None = said.get("variables")
-    for name in names or ():
+        refuse(named("solver"), said["solver"], known)
+    elif "solver" in said:
+        values["solver"] = solver
+    for name in said.get("variables", ()):
         if name not in system.states:
             known = f"{name} is no state; the states are {', '.join(system.states)}"
-            refuse(named("variables"), ",".join(names or ()), known)
-    return names
+            refuse(named("variables"), ",".join(said["variables"]), known)
+    return replace(own, **values, outputs=own.outputs if objective == "tube" else ())

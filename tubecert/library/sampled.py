@@ -8,9 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from tubecert.enclosure.interval import Array
 from tubecert.library.certifying import ran
@@ -21,13 +19,9 @@ from tubecert.sampled_loop.record import Certificate, Result, Shares, certificat
 from tubecert.spec import Spec
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from tubecert.certificate.belonging import Belonging
-    from tubecert.controller.data import Data
+    from tubecert.controller.recursion import SampledController
     from tubecert.report.page import Reason
-
-_ON_TIME: Final = 1e-6  # of a sample time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,47 +108,9 @@ class SampledCertification(Stated[Certificate]):
         Raises `TubecertError` if nothing is certified, or without a controller.
         """
         from tubecert.controller.data import data_of
+        from tubecert.controller.recursion import SampledController
 
         return SampledController(data_of(self.certificate))
-
-
-class SampledController:
-    """The recursion of a certificate's tables in numpy: `u = controller(t, y)` once a sample, beginning with t = 0.
-
-    What is exported in C computes the same, and also judges samples and clips inputs.
-    """
-
-    def __init__(self, data: Data) -> None:
-        self.sample_time, self.samples = float(data.sample_time), 0
-        self._plan, self._tables, self._row = data.plan, data.tables, 0
-        self._zeta = np.zeros(data.sizes[2])
-
-    def __call__(
-        self, t: float, y: ArrayLike, x: ArrayLike | None = None, u: ArrayLike | None = None
-    ) -> Array:
-        """The input (m,) for the state (n,) that is measured at t, in s; it acts after the delay, for a sample time.
-
-        Of a family the plan comes with every sample: x* at t (n,), and u* (m,) as it is held while the input acts.
-        Raises `ValueError` if t is not the time of the next sample, if y is no state, if a plan is missing, or is over.
-        """
-        plan, tables = self._plan, self._tables
-        if abs(t / self.sample_time - self.samples) > _ON_TIME * (1 + self.samples):
-            raise ValueError(f"the next sample is at t = {self.samples * self.sample_time} s")
-        if (plan.at is None) is (x is None or u is None):
-            raise ValueError("x and u are given for a family of plans, and only there")
-        if self._row >= plan.steps:
-            raise ValueError("the plan is over, and nothing is proven for later")
-        given = (x, u) if plan.at is None else plan.at([self._row])
-        planned, held = (np.ravel(np.asarray(each, float)) for each in given)
-        measured = np.asarray(y, float)
-        if measured.shape != planned.shape:
-            raise ValueError(f"y has {measured.size} numbers, the state has {planned.size}")
-        off = measured - planned
-        command = held + tables["M"] @ self._zeta + tables["N"] @ off
-        self._zeta = tables["F"] @ self._zeta + tables["G"] @ off
-        self.samples += 1
-        self._row = self._row + 1 if self._row + 1 < plan.steps else plan.after
-        return np.asarray(command)
 
 
 def certified(spec: Spec, progress: Progress | None) -> SampledCertification:

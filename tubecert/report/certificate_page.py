@@ -176,7 +176,13 @@ def _gains(result: Result) -> Iterator[Block]:
 
 def _gains_row(row: Gains) -> tuple[str, ...]:
     gains = ("" if gain is None else exact(gain) for gain in (row.pair.bandwidth, row.pair.adaptation_rate))
-    return NAMES[row.section], f"{row.which} *" if row.decides else row.which, row.verdict, *gains, row.slack
+    return (
+        NAMES[row.section],
+        f"{row.chosen} *" if row.decides else row.chosen,
+        row.verdict,
+        *gains,
+        row.slack,
+    )
 
 
 def _filled(result: Result) -> Iterator[Block]:

@@ -59,7 +59,7 @@ def _place(row: Gains) -> Point | None:
 
 
 def _told(row: Gains) -> str:
-    return f"{NAMES[row.section]}, {row.which}: {row.text()}"
+    return f"{NAMES[row.section]}, {row.chosen}: {row.text()}"
 
 
 def rate_figures(rows: Sequence[MetricRow]) -> list[Figure]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
+from types import MappingProxyType
 from typing import Final
 
 from tubecert.certificate.result import Result
 from tubecert.claims.conditions import SECTIONS
 from tubecert.digits import exact, percent
+from tubecert.kinds import name_of
 from tubecert.kinds.kind import Pair, Role
 from tubecert.verdict import Verdict
 
@@ -25,7 +27,10 @@ ROLES: Final[Mapping[Role, str]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
-    """One set of gains of one certificate, with its verdict, and whether it decides."""
+    """One set of gains of one kind of certificate, proven (or not, see `verdict`) on its own: never mix two sets.
+
+    `decides`: whether the verdict is about them. `pair` has them as fractions.
+    """
 
     section: str
     verdict: Verdict
@@ -33,9 +38,34 @@ class Gains:
     pair: Pair
 
     @property
-    def which(self) -> str:
+    def kind(self) -> str:
+        """The letter of its kind."""
+        return name_of(self.section).letter
+
+    @property
+    def chosen(self) -> str:
         """What the gains are chosen for."""
         return ROLES[self.pair.role]
+
+    @property
+    def certified(self) -> bool:
+        """Whether these gains are proven to suffice."""
+        return self.verdict is Verdict.CERTIFIED
+
+    @property
+    def omega(self) -> float | None:
+        """The filter bandwidth in rad/s, as the certificate prints it; None where the loop has none."""
+        return None if self.pair.bandwidth is None else float(self.pair.bandwidth)
+
+    @property
+    def Gamma(self) -> float | None:
+        """The adaptation rate, as the certificate prints it; None where the loop has none."""
+        return None if self.pair.adaptation_rate is None else float(self.pair.adaptation_rate)
+
+    @property
+    def margins(self) -> Mapping[str, tuple[float, float]]:
+        """By condition what is left, as a share of what is allowed: proven from below and from above."""
+        return MappingProxyType({name: (m.below, m.above) for name, m in self.pair.margins.items()})
 
     def text(self, *, titled: bool = False) -> str:
         """The gains for the verdict line, with their certificate's name if there are several."""
