@@ -117,6 +117,25 @@ limits: {u: [-3, 3]}
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("wind", ["", "disturbance: {E: [[0], [1]], bound: 1e-9}\n"])
+def test_what_is_not_linear_along_a_plan_is_learnt_where_hardly_anything_else_moves_the_state(wind):
+    """A filter that counts on nothing but the wind would take nothing from what is measured: an open loop."""
+    text = """tubecert: 1
+name: pendulum
+system: {states: [q, w], inputs: [u], f: [w, -9.81*sin(q) - 0.1*w], B: [[0], [1]]}
+safe_set: {q: [-1, 3], w: [-5, 5]}
+trajectory:
+  kind: expressions
+  horizon: 4
+  x: [0.8*(1 - cos(0.8*t)), 0.64*sin(0.8*t)]
+  u: [0.512*cos(0.8*t) + 9.81*sin(0.8*(1 - cos(0.8*t))) + 0.064*sin(0.8*t)]
+hardware: {rate: 200, delay: 0.002, noise: {q: 0.001, w: 0.01}}
+limits: {u: [-20, 20]}
+"""
+    assert certify(load_text(text + wind, "pendulum.yaml")).result.verdict == "certified"
+
+
+@pytest.mark.slow
 def test_a_wish_is_paid_by_other_states():
     plain = design(double())
     wished = design(double(wishes=[np.inf, 0.8 * plain.W[1]]))

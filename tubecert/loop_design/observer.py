@@ -62,7 +62,8 @@ class Observer:
     """A plant in units of its own, its sample, and its model of eta: what its components do, without repetition.
 
     `kept` (p,) of the components span what all do, `mixed` (p, r) how; `moved` (r,) is how far each gets in a sample.
-    `shaken` (n, -): what wind does in a sample, and errors like those of the start, which are rare.
+    `shaken` (n, -): what wind does in a sample, and errors like those of the start, which are rare; without
+    eta, what is not linear where that is more.
     """
 
     plant: Plant
@@ -143,23 +144,28 @@ def observe(plant: Plant) -> Observer:
     Components of eta that do what others do cannot be told apart by any filter: they are one for the observer. One that
     does nothing is none.
     """
+    (n, m), sample = plant.B.shape, sample_of(plant)
     active = np.flatnonzero((plant.magnitude > 0) & (np.abs(plant.H) > CLEAN).any(axis=0))
     kept = active
     if len(active):
         triangle, pivots = qr(plant.H[:, active], mode="r", pivoting=True)
         sizes = np.abs(np.diagonal(triangle))
         kept = active[pivots[: int((sizes > PARALLEL * sizes[0]).sum())]]
+    wind = parts(plant, sample.kernels.sum(0))[2]
+    shaken = [wind, RARE * np.diag(plant.start)[:, plant.start > 0]]
+    if (
+        not active.size
+    ):  # where only what is not linear moves e, nothing else would let the filter learn of it
+        rest = plant.sample_time * plant.remainder(np.ones(n), np.zeros(m))[:n]
+        shaken.append(np.diag(rest)[:, rest > np.maximum(CLEAN, 10 * np.abs(wind).sum(axis=1))])
     mixed = np.linalg.lstsq(plant.H[:, kept], plant.H)[0] if len(kept) else np.zeros((0, plant.H.shape[1]))
-    sample = sample_of(plant)
     return Observer(
         plant=plant,
         sample=sample,
         kept=kept,
         mixed=np.where(np.abs(mixed) < CLEAN, 0.0, mixed),
         moved=np.clip(plant.rate * plant.sample_time, LEAST, np.maximum(LEAST, 2 * plant.magnitude)),
-        shaken=np.hstack(
-            [parts(plant, sample.kernels.sum(0))[2], RARE * np.diag(plant.start)[:, plant.start > 0]]
-        ),
+        shaken=np.hstack(shaken),
     )
 
 
