@@ -11,7 +11,7 @@ expressions; what is undefined on the safe set, as findings; a decision about th
 """
 
 from tubecert.model.affine import TIME, ControlAffineModel, build, divide, moving_parts, time_period
-from tubecert.model.defined import domain_findings, place, unending
+from tubecert.model.defined import domain_findings, place
 from tubecert.model.rank import rank_decision
 
 __all__ = [
@@ -24,5 +24,4 @@ __all__ = [
     "place",
     "rank_decision",
     "time_period",
-    "unending",
 ]

@@ -7,17 +7,14 @@ from typing import TYPE_CHECKING
 from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort, decide
 from tubecert.enclosure.domain import BoxDomain, Range
-from tubecert.enclosure.interval import fraction_bounds
 from tubecert.enclosure.pencil import scalar
 from tubecert.expression import Obligation, free_symbols, to_text
 from tubecert.findings import Finding
-from tubecert.model.affine import TIME, moving_parts, nonzero, time_period, vanishes
+from tubecert.model.affine import TIME, nonzero, vanishes
 from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
-    from fractions import Fraction
-
-    from tubecert.spec import Knots, Spec, Term
+    from tubecert.spec import Spec, Term
 
 
 def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
@@ -42,36 +39,6 @@ def domain_findings(spec: Spec, time: Range | None, effort: Effort) -> list[Find
     for term in (*spec.trajectory.x, *spec.trajectory.u):
         findings += _undefined(term, over_time, "the horizon", effort)
     return findings
-
-
-def unending(spec: Spec, knots: Knots | None) -> list[Finding]:
-    """Why a computer's h or plan is not known for all times of the claim; `knots` of a plan that goes through some."""
-
-    def refused(path: str, message: str, help: str) -> Finding:
-        return Finding(code="TC204", message=message, location=spec.location(path), help=help)
-
-    plan = spec.trajectory
-    if (plan.horizon is None or plan.afterwards != "nothing") and time_period(moving_parts(spec)) is None:
-        unseen = "h depends on t for ever, without a period that can be seen"
-        return [refused("uncertainty.h", unseen, "give trajectory.horizon, in s")]
-    if plan.afterwards != "repeat" or plan.horizon is None or _repeats(spec, plan.horizon, knots):
-        return []
-    ends = "the plan does not repeat: its ends differ, or its period is longer than the horizon or unknown"
-    help = "leave out afterwards, or give a plan whose period is not longer than trajectory.horizon"
-    return [refused("trajectory.afterwards", ends, help)]
-
-
-def _repeats(spec: Spec, end: Fraction, knots: Knots | None) -> bool:
-    """Whether a plan begins again where its horizon ends.
-
-    Formulas go on as they are, with a period that is not longer than the horizon; knots begin again, which needs
-    equal ends and a horizon of whole samples.
-    """
-    if knots is not None:
-        whole = spec.hardware is None or (end / spec.hardware.sample_time).denominator == 1
-        return whole and knots.t[-1] == end and knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
-    period = time_period(term.expression for term in (*spec.trajectory.x, *spec.trajectory.u))
-    return period is not None and bool(period.hi <= fraction_bounds(end)[0])
 
 
 def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort) -> list[Finding]:

@@ -7,11 +7,12 @@ from pathlib import Path
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import lint, name_findings
-from tubecert.model import build, domain_findings, place, rank_decision, unending
+from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.load import NO_SEARCH
 from tubecert.spec.metric_file import of_no_metric
 from tubecert.stages.time import time_of
+from tubecert.trajectory.make import unending
 from tubecert.verdict import Verdict
 
 

@@ -23,7 +23,7 @@ from tubecert.enclosure.interval import Array, fraction_bounds
 from tubecert.enclosure.outward import number_above, number_below
 from tubecert.enclosure.processor import require_ieee
 from tubecert.findings import Finding
-from tubecert.model import ControlAffineModel, domain_findings, unending
+from tubecert.model import ControlAffineModel, domain_findings
 from tubecert.sampled_loop.cells import MOST
 from tubecert.sampled_loop.matrices import ROUNDED, UNIT, total
 from tubecert.sampled_loop.obstacles import cleared
@@ -31,6 +31,7 @@ from tubecert.sampled_loop.record import Cleared, InputUse, Lack, Recipe, Stage,
 from tubecert.sampled_loop.remainders import Remainders, Sizes
 from tubecert.sampled_loop.responses import Responses
 from tubecert.sampled_loop.setting import PLAN_ROUNDING, ROUNDING, Loop
+from tubecert.trajectory.make import unending
 from tubecert.trajectory.plan import Family
 from tubecert.verdict import Verdict
 

@@ -7,7 +7,7 @@ of its defect p = x*' - f(x*) - B(x*) u*. Trusted: yes, but for the planner.
 |---|---|---|
 | `plan` | a plan as expressions of t: what every plan can be asked; every plan at once; sup |p| | yes |
 | `pieces`, `hermite` | a plan through knots: cubic Hermite pieces, and their data as intervals | yes |
-| `make` | specification -> plan; sub-knots until the defect is negligible | yes |
+| `make` | specification -> plan; sub-knots until the defect is negligible; whether it goes on | yes |
 """
 
 from tubecert.trajectory.plan import Plan, constant_plan, inputs

@@ -19,7 +19,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import fraction_bounds
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
-from tubecert.model import ControlAffineModel
+from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.spec import Knots, Spec, Task
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import Defect, Plan, family
@@ -122,3 +122,33 @@ def remedy(plan: Plan, model: ControlAffineModel, room: Room) -> PlanRemedy:
     if instead < 0.5 * own:
         return OtherInterpolation(interpolation=other, defect=instead)
     return MoreKnots()
+
+
+def unending(spec: Spec, knots: Knots | None) -> list[Finding]:
+    """Why a computer's h or plan is not known for all times of the claim; `knots` of a plan that goes through some."""
+
+    def refused(path: str, message: str, help: str) -> Finding:
+        return Finding(code="TC204", message=message, location=spec.location(path), help=help)
+
+    plan = spec.trajectory
+    if (plan.horizon is None or plan.afterwards != "nothing") and time_period(moving_parts(spec)) is None:
+        unseen = "h depends on t for ever, without a period that can be seen"
+        return [refused("uncertainty.h", unseen, "give trajectory.horizon, in s")]
+    if plan.afterwards != "repeat" or plan.horizon is None or _repeats(spec, plan.horizon, knots):
+        return []
+    ends = "the plan does not repeat: its ends differ, or its period is longer than the horizon or unknown"
+    help = "leave out afterwards, or give a plan whose period is not longer than trajectory.horizon"
+    return [refused("trajectory.afterwards", ends, help)]
+
+
+def _repeats(spec: Spec, end: Fraction, knots: Knots | None) -> bool:
+    """Whether a plan begins again where its horizon ends.
+
+    Formulas go on as they are, with a period that is not longer than the horizon; knots begin again, which needs
+    equal ends and a horizon of whole samples.
+    """
+    if knots is not None:
+        whole = spec.hardware is None or (end / spec.hardware.sample_time).denominator == 1
+        return whole and knots.t[-1] == end and knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
+    period = time_period(term.expression for term in (*spec.trajectory.x, *spec.trajectory.u))
+    return period is not None and bool(period.hi <= fraction_bounds(end)[0])
