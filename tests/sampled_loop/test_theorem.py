@@ -503,6 +503,11 @@ def test_a_command_acts_in_its_own_stage():
         ({"uncertainty": "{bounds: {h: 3, h_x: 0.2, h_t: 1}}", "trajectory": WAVE}, 3, 1.2, 3),
         ({"uncertainty": "{bounds: {h: 3, h_x: 0.2, h_t: 1}}", "trajectory": TWICE}, 3, 1.4, 3),
         ({"disturbance": "{E: [[1]], bound: 0.3, rate: 2}"}, 0.3, 2, 0.3),
+        (
+            {"uncertainty": "{bounds: {h: 3, h_x: 0.2, h_t: 1}}", "initial_state": "{within: 0.1}",
+             "trajectory": "{kind: any, x: {x: [-1, 1]}, u: {u: [-2, 1]}, defect: 0.5, input_rate: 4}"},
+            3, 1 + 0.2 * 2.5, 3,
+        ),
         ({"trajectory": WAVE, "system": scalar("(p - 1)*x", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
         ({"trajectory": WAVE, "system": scalar("0", "p", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
         ({"trajectory": WAVE, "system": scalar("(p - 1)*x**2", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
@@ -582,10 +587,15 @@ def test_the_state_that_is_too_wide_is_named_and_inputs_are_those_of_the_widest_
     assert [float(end) for end in found.inputs[0].range] == pytest.approx([-4, 4])
 
 
-@pytest.mark.parametrize(("ends", "lacks"), [("[-1.1, 3]", []), ("[-1.1, 0.9]", ["x"]), ("[-0.9, 3]", ["x"])])
+@pytest.mark.parametrize(("ends", "lacks"), [("[-1.6, 3]", []), ("[-1.6, 1.4]", ["x"]), ("[-1.4, 3]", ["x"])])
 def test_a_tube_keeps_to_both_ends_of_the_safe_set(ends, lacks):
-    found = judged(loop_of(safe_set=f"{{x: {ends}}}"), controller_of(), (0, [1], 9))
+    found = judged(loop_of(safe_set=f"{{x: {ends}}}", trajectory=WAVE), controller_of(), (0, [0.5], 9))
     assert [lack.where for lack in found.lacks if lack.kind == "safe_set"] == lacks
+
+
+@pytest.mark.parametrize(("entry", "verdict"), [(-10, "certified"), (-10.1, "undecided")])
+def test_tables_are_of_single_precision(entry, verdict):
+    assert judged(loop_of(), controller_of([[entry]]), (0, [1], 9)).verdict.value == verdict
 
 
 def test_cuts_are_lags():
