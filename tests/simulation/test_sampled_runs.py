@@ -44,7 +44,7 @@ def test_commands_act_after_their_delay_as_matrix_exponentials_say(delay):
     """Delays of 0, a half, 1 and 2.5 samples."""
     own = setting("cart", ("delay: 0.02", f"delay: {delay}"), ("0.2*sin(t)", "0"), duration="2")
     path, lanes, attack = run(own)
-    Ts, tau, N = 0.05, float(delay), proven("cart").controller.N.value
+    Ts, tau, N = 0.05, float(delay), proven("cart").controller.N
     x = lanes.off
     commands: dict[int, np.ndarray] = {}
     for k in range(own.samples):
@@ -65,7 +65,7 @@ def test_a_nonlinear_plant_is_integrated_as_by_another_method():
     draws = np.random.default_rng(1).random((3 * 3 + 2, 3))
     course = courses(own, own.spec.trajectory.bundle, draws)
     (coarse, _, _), (path, lanes, attack) = (run(own, course, level) for level in (0, 1))
-    N, Ts = proven("pendulum").controller.N.value, 0.02
+    N, Ts = proven("pendulum").controller.N, 0.02
     g, commands, x = lanes.parameters[0], [np.zeros((1, 3))], course.x[0] + lanes.off
     for k in range(own.samples):
         plan = course.x[k * len(own.lengths)]

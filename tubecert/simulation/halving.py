@@ -25,7 +25,7 @@ _LUCK: Final = 2.0  # times a change an error may be, where a feedback has kinks
 _BEFORE: Final = 1 / 8  # ... and times the change before
 
 
-class Family(Protocol):
+class Vector(Protocol):
     """N lanes that can be run in the steps of any level, each with twice as many as the one before."""
 
     N: int
@@ -35,8 +35,8 @@ class Family(Protocol):
         """Some of the lanes at a level."""
         ...
 
-    def apart(self, finer: Found, coarser: Found) -> tuple[Array, Array]:
-        """How far states are apart at the output times (K, N), and what else is, in shares of what may be, (N,)."""
+    def apart(self, lanes: Places, finer: Found, coarser: Found) -> tuple[Array, Array]:
+        """How far states of lanes are apart at the output times (K, N), and what else is, in shares of what may be."""
         ...
 
 
@@ -54,37 +54,37 @@ class Resolved(NamedTuple):
     steps: NDArray[np.int64]
 
 
-def proposed(family: Family) -> Resolved:
+def proposed(vector: Vector) -> Resolved:
     """All lanes in the longest steps; their error is not known: inf."""
-    system = family.system(np.arange(family.N), 0)
-    error, never = np.full(family.N, np.inf), np.full(family.N, np.nan)
-    return Resolved(follow(system), error, never, np.full(family.N, len(system.steps.start) - 1))
+    system = vector.system(np.arange(vector.N), 0)
+    error, never = np.full(vector.N, np.inf), np.full(vector.N, np.nan)
+    return Resolved(follow(system), error, never, np.full(vector.N, len(system.steps.start) - 1))
 
 
-def resolved(family: Family, tolerance: float) -> Resolved:
+def resolved(vector: Vector, tolerance: float) -> Resolved:
     """All lanes, level after level of those that are not done.
 
     What is told of a lane's error is at most five tolerances, or it cannot be integrated so far. It is given up as soon
     as halving its steps no longer helps, which is so where the loop itself amplifies every difference.
     """
-    best, lanes = proposed(family), np.arange(family.N)
-    changes = np.full((_LEVELS, family.N), np.inf)
-    failed = np.zeros((_LEVELS, family.N), dtype=bool)
+    best, lanes = proposed(vector), np.arange(vector.N)
+    changes = np.full((_LEVELS, vector.N), np.inf)
+    failed = np.zeros((_LEVELS, vector.N), dtype=bool)
     failed[0] = best.found.stopped > 0
     for level in range(1, _LEVELS):
-        system, whole = family.system(lanes, level), len(lanes) == family.N
+        system, whole = vector.system(lanes, level), len(lanes) == vector.N
         coarser, finer = best.found if whole else of_some(best.found, lanes), follow(system)
         best = best._replace(found=finer if whole else combined([best.found, finer], _put(lanes)))
         best.steps[lanes] = len(system.steps.start) - 1
-        apart, beside = family.apart(finer, coarser)
+        apart, beside = vector.apart(lanes, finer, coarser)
         change = np.nan_to_num(apart.max(axis=0), nan=np.inf)
         failed[level, lanes], changes[level, lanes] = finer.stopped > 0, change
         told = np.maximum(_LUCK * change, changes[level - 1, lanes] * _BEFORE if level > 1 else 0.0)
         best.error[lanes] = np.where(failed[level, lanes], np.inf, told)
         beyond = ~(apart <= tolerance)
-        first = family.times[np.argmax(beyond, axis=0)]
+        first = vector.times[np.argmax(beyond, axis=0)]
         best.unresolved[lanes] = np.where(beyond.any(axis=0), first, np.nan)
-        agree = np.abs(finer.ended - coarser.ended) <= _AGREEING * family.times[-1]
+        agree = np.abs(finer.ended - coarser.ended) <= _AGREEING * vector.times[-1]
         agree &= failed[level - 1, lanes] & (np.searchsorted(system.steps.start, finer.ended) >= _LIVED)
         near = (told <= _ENOUGH * tolerance) & (beside <= 1)
         done = np.where(failed[level, lanes], agree, near)

@@ -50,7 +50,7 @@ def integrate(batches: Sequence[Batch], *, tolerance: float, count: int | None =
 
 
 class _Lanes:
-    """The lanes of all batches: a `halving.Family`. `grid` is that of the first level."""
+    """The lanes of all batches: a `halving.Vector`. `grid` is that of the first level."""
 
     def __init__(self, batches: Sequence[Batch], count: int | None) -> None:
         first = batches[0].problem
@@ -76,15 +76,14 @@ class _Lanes:
     def system(self, lanes: Places, level: int) -> Continuous:
         """Some of the lanes at a level."""
         own = [batch.of(lanes[(lanes >= a) & (lanes < b)] - a) for batch, a, b in self.parts()]
-        self._own = lanes
         grid = self._grid(level) if level else self.grid
         return Continuous([batch for batch in own if len(batch.x0)], grid, self.plans)
 
-    def apart(self, finer: Found, coarser: Found) -> tuple[Array, Array]:
+    def apart(self, lanes: Places, finer: Found, coarser: Found) -> tuple[Array, Array]:
         """|S x| of differences, and those of sigma_hat and its peak, of the room that they have."""
         z = finer.seen["x"] - coarser.seen["x"]
         square = (z * (z if self._P is None else self._P @ z)).sum(axis=1)
         moved = np.sqrt(((finer.seen["sigma_hat"] - coarser.seen["sigma_hat"]) ** 2).sum(axis=1)).max(axis=0)
         with np.errstate(invalid="ignore"):  # lanes that were stopped at once have no peak
             peaks = np.abs(finer.peak["sigma_error"] - coarser.peak["sigma_error"])
-        return np.sqrt(np.maximum(square, 0.0)), np.maximum(moved, peaks) / self._room[self._own]
+        return np.sqrt(np.maximum(square, 0.0)), np.maximum(moved, peaks) / self._room[lanes]

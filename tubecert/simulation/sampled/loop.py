@@ -147,7 +147,7 @@ def outputs(setting: Setting) -> NDArray[np.int64]:
 
 
 class Vector:
-    """Lanes of an attack, whose steps can be made shorter: a `halving.Family`."""
+    """Lanes of an attack, whose steps can be made shorter: a `halving.Vector`."""
 
     def __init__(self, attack: Attack, lanes: Lanes, made: Controllers) -> None:
         own, bundle = attack.setting, attack.setting.spec.trajectory.bundle
@@ -165,7 +165,7 @@ class Vector:
         self.profile = system.profile if len(lanes) == self.N else np.maximum(self.profile, system.profile)
         return system
 
-    def apart(self, finer: Found, coarser: Found) -> tuple[Array, Array]:
+    def apart(self, lanes: Places, finer: Found, coarser: Found) -> tuple[Array, Array]:
         """Differences of states in shares of what is proven; lanes whose plan is over are not apart."""
         own = self._attack.setting
         bounds = own.at(np.minimum(outputs(own), own.samples - 1)).T[:, : own.loop.states, None]
