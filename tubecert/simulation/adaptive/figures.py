@@ -166,36 +166,27 @@ def _tube_use(campaign: Campaign) -> Figure:
 
 def _monte_carlo(campaign: Campaign) -> Figure | None:
     """How the runs of a sample are spread over the tube, over time."""
-    attacks = campaign.attacks
-    if not attacks:
+    if not campaign.attacks:
         return None
-    reach = campaign.setting.reach
-    figure = blank(7.0, 0.8 + 2.8 * len(attacks))
-    axes = figure.subplots(len(attacks), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, attack in zip(axes, attacks, strict=True):
-        color, runs = COLORS[attack.loop.controller], attack.random.runs
-        share = runs.distance / reach
-        alive = ~np.isnan(share).all(axis=0)
-        t, share = runs.t[alive], share[:, alive]
-        low, q25, median, q75, high = np.nanquantile(share, [0, 0.25, 0.5, 0.75, 1], axis=0)
-        axis.fill_between(t, low, high, color=color, alpha=0.18, lw=0, label="all runs")
-        axis.fill_between(t, q25, q75, color=color, alpha=0.35, lw=0, label="middle half")
-        axis.plot(t, median, color=color, label="median")
-        if attack.adversary is not None:
-            worst = attack.adversary.runs
-            axis.plot(worst.t, worst.distance[0] / reach, color="black", lw=1.0, label="worst adversary")
-        if attack.loop.promise is not None and attack.loop.promise.decay is not None:
-            bound = attack.loop.promise.decay(t) / reach
-            axis.plot(t, bound, color=TUBE, lw=1.4, ls="--", label="certified D(t)")
-        axis.axhline(1, color=TUBE, lw=1.2, label="tube")
-        axis.set_ylim(0, min(max(1.08, 1.05 * float(np.nanmax(share))), _FARTHEST))
-        axis.set_ylabel("d(x*, x) / dbar")
-        title = f"{_NAMES[attack.loop.controller]}: {len(share)} random runs, seed {campaign.seed}"
-        axis.set_title(title, fontsize=9, loc="left")
-        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    axes[-1].set_xlabel("t [s]")
-    axes[-1].set_xlim(0, campaign.setting.horizon)
-    return figure
+    (attack,), reach = campaign.attacks, campaign.setting.reach
+    figure, color, runs = blank(7.0, 3.6), COLORS[attack.loop.controller], attack.random.runs
+    axis, share = figure.subplots(), runs.distance / reach
+    alive = ~np.isnan(share).all(axis=0)
+    t, share = runs.t[alive], share[:, alive]
+    low, q25, median, q75, high = np.nanquantile(share, [0, 0.25, 0.5, 0.75, 1], axis=0)
+    axis.fill_between(t, low, high, color=color, alpha=0.18, lw=0, label=f"{len(share)} random runs")
+    axis.fill_between(t, q25, q75, color=color, alpha=0.35, lw=0, label="middle half")
+    axis.plot(t, median, color=color, label="median")
+    if attack.adversary is not None:
+        worst = attack.adversary.runs
+        axis.plot(worst.t, worst.distance[0] / reach, color="black", lw=1.0, label="worst adversary")
+    if attack.loop.promise is not None and attack.loop.promise.decay is not None:
+        bound = attack.loop.promise.decay(t) / reach
+        axis.plot(t, bound, color=TUBE, lw=1.4, ls="--", label="certified D(t)")
+    axis.axhline(1, color=TUBE, lw=1.2, label="tube")
+    axis.set_ylim(0, min(max(1.08, 1.05 * float(np.nanmax(share))), _FARTHEST))
+    axis.set_ylabel("d(x*, x) / dbar")
+    return _over_time(figure, axis, axis, campaign)
 
 
 DRAWERS: Final[Mapping[str, Callable[[Campaign], Figure | None]]] = {
