@@ -186,7 +186,7 @@ def _monte_carlo(campaign: Campaign) -> Figure | None:
     axis.axhline(1, color=TUBE, lw=1.2, label="tube")
     axis.set_ylim(0, min(max(1.08, 1.05 * float(np.nanmax(share))), _FARTHEST))
     axis.set_ylabel("d(x*, x) / dbar")
-    return _over_time(figure, axis, axis, campaign)
+    return _over_time(figure, axis, axis, campaign, f"random runs of {_NAMES['l1']}, seed {campaign.seed}")
 
 
 DRAWERS: Final[Mapping[str, Callable[[Campaign], Figure | None]]] = {
@@ -205,16 +205,17 @@ def _draw(axis: Axes, loop: Loop, x: Array, y: Array, about: str = "", **style: 
     axis.plot(x, y, **(usual | style))
 
 
-def _title(campaign: Campaign) -> str:
+def _title(campaign: Campaign, what: str = "") -> str:
     setting = campaign.setting
-    return f"{setting.spec.name}: rho = {near(setting.rho, 4)}, uncertainty {campaign.uncertainty}"
+    about = what or f"uncertainty {campaign.uncertainty}"
+    return f"{setting.spec.name}: rho = {near(setting.rho, 4)}, {about}"
 
 
-def _over_time(figure: Figure, bottom: Axes, top: Axes, campaign: Campaign) -> Figure:
+def _over_time(figure: Figure, bottom: Axes, top: Axes, campaign: Campaign, what: str = "") -> Figure:
     """Time on the axes at the bottom; the title over those whose labels become the legend."""
     bottom.set_xlabel("t [s]")
     bottom.set_xlim(0, campaign.setting.horizon)
-    titled(figure, top, _title(campaign), 3)
+    titled(figure, top, _title(campaign, what), 3)
     return figure
 
 
