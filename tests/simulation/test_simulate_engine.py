@@ -14,6 +14,7 @@ from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulation.adaptive.engine import _Lanes, integrate
 from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopGains, LoopProblem
+from tubecert.simulation.adaptive.times import output_times
 from tubecert.simulation.lanes import follow
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
@@ -370,6 +371,21 @@ def test_loops_along_several_plans_are_lanes_of_one_vector():
         assert np.abs(own.x - found.x).max() <= own.error[0] + found.error[0] <= 1e-4
         assert np.array_equal(own.x_plan, found.x_plan)
         assert np.array_equal(own.u_plan, found.u_plan)
+
+
+@pytest.mark.parametrize(("knots", "count"), [(100, 251), (300, 301), (1000, 335)])
+def test_output_times_are_corners_of_a_plan_that_has_many(knots, count):
+    """So that both are ends of the same steps; of 1000 corners every third."""
+    t = tuple(Fraction(2 * i, knots) for i in range(knots + 1))
+    rows = tuple((Fraction(0), Fraction(0)) for _ in t)
+    plan = piecewise_plan(
+        TWO, Knots(t=t, x=rows, u=tuple((Fraction(i % 2),) for i in range(len(t))), interpolation="hold")
+    )
+    found = output_times(plan, 2.0)
+    assert (len(found), found[0], found[-1]) == (count, 0.0, 2.0)
+    assert (np.diff(found) > 0).all()
+    if knots >= 250:
+        assert np.abs(found * knots / 2 - np.round(found * knots / 2)).max() < 1e-9
 
 
 @pytest.mark.slow
