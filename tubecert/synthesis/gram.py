@@ -38,12 +38,12 @@ class GramForm:
 
 
 @lru_cache(maxsize=64)
-def gram_form(orders: tuple[int, ...], size: int, raised: int = 0, signs: Signs = ()) -> GramForm:
-    """The form for C (size, size) of degree `orders[i]` in u_i; multipliers have `raised` times two degrees more.
+def gram_form(orders: tuple[int, ...], size: int, signs: Signs = ()) -> GramForm:
+    """The form for C (size, size) of degree `orders[i]` in u_i.
 
     Each of `signs` is a symmetry: for every variable, then for every row of C, 1 or -1, with C(u) = D C(S u) D.
     """
-    half = tuple((order + 1) // 2 + (raised if order else 0) for order in orders)
+    half = tuple((order + 1) // 2 for order in orders)
     multipliers: list[int | None] = [None, *(i for i, h in enumerate(half) if h)]
     blocks = [(basis, i) for i in multipliers for basis in _classes(_basis(half, i, size), signs)]
     plain = [basis for basis, i in blocks if i is None]

@@ -26,28 +26,23 @@ from tubecert.synthesis.problem import Proposal, SynthesisProblem
 Array = NDArray[np.float64]
 ROUTE = "sos"
 _DUST = 1e-11  # relative to the largest coefficient
-_PIECES = 2
 
 
-def propose_sos(problem: SynthesisProblem, *, raised: int = 0) -> Proposal:
-    """The member of the family with the least kappa that sums of squares find.
-
-    `raised`: by so many steps finer than the degrees of the conditions suggest: multipliers of two degrees more, and
-    twice the pieces where variables are replaced by control points.
-    """
+def propose_sos(problem: SynthesisProblem) -> Proposal:
+    """The member of the family with the least kappa that sums of squares find."""
     start = perf_counter()
     try:
-        conditions = polynomial_conditions(problem, pieces=_PIECES << raised)
+        conditions = polynomial_conditions(problem)
     except (NotPolynomialError, NotLiftedError) as error:
         return _proposal(None, ConicSolution.none(f"sums of squares do not apply: {error}"), problem, start)
     if problem.progress is not None:
         words = f"sums of squares: {len(conditions.conditions)} polynomial matrices"
         problem.progress(Step(phase=Phase.SYNTHESIS, name=words))
-    found = solve(sos_program(conditions, raised=raised), problem.solver)
+    found = solve(sos_program(conditions), problem.solver)
     return _proposal(conditions, found, problem, start)
 
 
-def sos_program(conditions: Conditions, *, raised: int = 0) -> ConicProgram:
+def sos_program(conditions: Conditions) -> ConicProgram:
     """Minimise kappa: variables are the unknowns, kappa, then every condition's free Gram entries."""
     count = conditions.unknowns.count
     orders: list[int] = []
@@ -57,7 +52,7 @@ def sos_program(conditions: Conditions, *, raised: int = 0) -> ConicProgram:
     columns: list[NDArray[Any]] = []
     row, column = 0, count + 1
     for condition in conditions.conditions:
-        form = gram_form(condition.orders, condition.size, raised, condition.signs)
+        form = gram_form(condition.orders, condition.size, condition.signs)
         table = form.pivots @ _clean(condition)
         shared, free = table[:, :-1], form.free
         i, j = np.nonzero(shared)
