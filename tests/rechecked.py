@@ -11,8 +11,8 @@ import proven
 
 from tubecert import certificate
 from tubecert.errors import TubecertError
-from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
+from tubecert.recheck.claims import Case
 from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import read
 from tubecert.recheck.run import Recheck, recheck

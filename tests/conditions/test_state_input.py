@@ -9,7 +9,7 @@ import pytest
 from tubecert.claims.statements import MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.domain import BoxDomain
-from tubecert.enclosure.projected import ProjectedPencil
+from tubecert.enclosure.pencil import ProjectedPencil
 from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.pipeline import Options, certify

@@ -20,8 +20,7 @@ from strategies import fractions
 from tubecert.bounds.feedback import tangents
 from tubecert.enclosure import taylor
 from tubecert.enclosure.objective import MetricNorm, SumOfNorms, Target
-from tubecert.enclosure.pencil import Pencil, SumOfPencils, WeightedPencil, Weights, scalar
-from tubecert.enclosure.projected import ProjectedPencil
+from tubecert.enclosure.pencil import Pencil, ProjectedPencil, SumOfPencils, WeightedPencil, Weights, scalar
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, exp, norm, sin, sqrt, symbol
 from tubecert.expression.matrix import combine, identity, multiply, transpose

@@ -9,7 +9,7 @@ import pytest
 
 from tubecert.bounds.feedback import ClosedFormGain, down_to_zero, tangents
 from tubecert.enclosure.objective import Target
-from tubecert.enclosure.projected import ProjectedPencil
+from tubecert.enclosure.pencil import ProjectedPencil
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import constant, cos, sin, symbol
 from tubecert.expression.matrix import matrix

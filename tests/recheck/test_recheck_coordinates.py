@@ -18,8 +18,8 @@ from systems import SMALL
 
 from tubecert.errors import TubecertError
 from tubecert.expression import number_text
-from tubecert.recheck.around import Ellipsoid
 from tubecert.recheck.coordinates import Coordinates, inverted
+from tubecert.recheck.tube import Ellipsoid
 
 # W = [[1, -0.3], [-0.3, 1.3]] and S W S' = I: a = A = 1, so that no entry of S may move; x = z1, y = 1.1 z2 - 0.3 z1
 S = [["1", "0"], ["3/11", "10/11"]]

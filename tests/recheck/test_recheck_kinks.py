@@ -13,12 +13,11 @@ from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import ExitCode
 from tubecert.model import build
-from tubecert.recheck.around import Round
 from tubecert.recheck.coordinates import Fields
 from tubecert.recheck.cover import prove, within
 from tubecert.recheck.curve import expressed
 from tubecert.recheck.lipschitz import LipschitzBelow, slopes_below
-from tubecert.recheck.tube import Tube
+from tubecert.recheck.tube import Round, Tube
 from tubecert.spec import load_text
 from tubecert.trajectory.make import plan_of
 

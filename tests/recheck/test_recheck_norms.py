@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import rechecked
 
-from tubecert.recheck import multiplier
+from tubecert.recheck import norms as by_norms
 from tubecert.recheck.cover import Outcome
 from tubecert.recheck.curve import expressed
-from tubecert.recheck.multiplier import column_below
-from tubecert.recheck.norms import norms
+from tubecert.recheck.norms import column_below, norms
 from tubecert.recheck.place import Place
 from tubecert.recheck.terms import number
 
@@ -78,7 +77,7 @@ def test_nothing_is_below_a_negative_limit():
 @pytest.mark.parametrize("share", [0.0, 0.3, 2.0])
 def test_no_multiplier_confirms_what_is_false(texts, share, monkeypatch):
     """It is a proposal: any other one may prove less, and never more."""
-    monkeypatch.setattr(multiplier, "_multiplier", lambda *_: Fraction(share))
+    monkeypatch.setattr(by_norms, "_multiplier", lambda *_: Fraction(share))
     found = column_below(place(), column(*texts), Fraction(largest(*texts) * 0.9999), 400)
     assert not found.holds
 

@@ -10,7 +10,7 @@ from flint import ctx
 from rechecked import case_of, certified, examine, failing, sealed
 from systems import SMALL
 
-from tubecert.recheck.start import _delta, _segment, _Speed
+from tubecert.recheck.start import _segment, _Speed, off_plan
 
 pytestmark = pytest.mark.slow
 FLAT = SMALL.replace("0.1*sin(t)", "0.1*cos(t)")
@@ -99,7 +99,7 @@ def test_a_segment_is_as_long_as_its_metric_makes_it(point, count):
             return mpmath.sqrt((2 * x * x - 2 * b * x * y + a * y * y) / (2 * a - b * b))
 
         true = mpmath.quad(speed, [0, 1])
-        delta = _delta(tuple(map(Fraction, point)), case.curve)
+        delta = off_plan(tuple(map(Fraction, point)), case.curve)
         low, high = _Speed(case.system, case.curve, delta).over_pieces(count)
         ends = [mpmath.mpf(end.str(40, radius=False)) for end in (low.lower(), high.upper())]
         assert ends[0] <= true <= ends[1]

@@ -7,8 +7,7 @@ import pytest
 from certificates import certified
 from typer.testing import CliRunner
 
-from tubecert.certificate.metric_file import MetricFile
-from tubecert.certificate.result import Result, SolverData
+from tubecert.certificate.result import MetricFile, Result, SolverData
 from tubecert.cli.app import app
 from tubecert.enclosure.constant import Constant
 from tubecert.report import certificate_brief, certificate_page, claimed, synthesis

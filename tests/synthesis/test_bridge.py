@@ -18,7 +18,7 @@ from tubecert import pipeline
 from tubecert.cli.app import app
 from tubecert.errors import SpecError
 from tubecert.spec import canonical, load_text
-from tubecert.synthesis import bridge, conic
+from tubecert.synthesis import conic
 from tubecert.synthesis.conic import Affine, ConicProgram, Semidefinite, solve
 
 ROOT = Path(__file__).parents[2]
@@ -65,7 +65,7 @@ def test_the_program_is_the_same(seed, solver):
 
 
 def test_a_solver_without_multipliers_is_believed_as_far_as_its_tolerance(monkeypatch):
-    monkeypatch.setattr(bridge, "_bound", lambda *_: None)
+    monkeypatch.setattr(conic, "_bound", lambda *_: None)
     found = solve(EIGENVALUE, "cvxpy:CLARABEL", tolerance=1e-6)
     assert found.objective == pytest.approx(3, abs=1e-5)
     assert found.bound == pytest.approx(3, abs=1e-5)
@@ -156,7 +156,6 @@ def test_a_lie_writes_no_metric(monkeypatch, tmp_path):
         "judged",
         lambda values, **rest: conic.ConicSolution(values=-values, **{**rest, "feasible": True}),
     )
-    monkeypatch.setattr(bridge, "judged", conic.judged)
     target = tmp_path / "metric.json"
     options = ["--rate", "1.7", "--degree", "0", "--solver", "cvxpy:CLARABEL", "-o", str(target)]
     assert CliRunner().invoke(app, ["synth", str(TWO), *options]).exit_code == 4

@@ -14,7 +14,7 @@ from systems import plain_model as system
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.tape import Tape
 from tubecert.expression.matrix import identity
-from tubecert.synthesis import cegis, program
+from tubecert.synthesis import cegis
 from tubecert.synthesis import forms as symmetries
 from tubecert.synthesis.attack import Attacker, Judgement, Region, counterexample, worst
 from tubecert.synthesis.family import MetricFamily, metric_family
@@ -249,7 +249,7 @@ def test_of_metrics_of_one_input_gain_a_smaller_one_is_taken(monkeypatch):
     )
     asked = problem(model, (*TWO_BOX, *box((-1, 1), (-1, 1))), 1.0, floor="input")
     small = cegis.propose(asked)
-    monkeypatch.setattr(program, "_SMALL", 0.0)
+    monkeypatch.setattr(cegis, "_SMALL", 0.0)
     any_one = cegis.propose(asked)
     assert small.kappa == pytest.approx(any_one.kappa, rel=3e-3)
     assert 0.25 <= small.coefficients[0][0, 0] < 0.4 < any_one.coefficients[0][0, 0]
@@ -360,7 +360,7 @@ def test_limit_and_progress():
 
 
 def lying(change):
-    honest = program.solve
+    honest = cegis.solve
 
     def solve(*args, **kwargs):
         return change(honest(*args, **kwargs))
@@ -396,7 +396,7 @@ LIES = {
 @pytest.mark.parametrize("lie", LIES)
 @pytest.mark.parametrize("rate", [1.5, 2.5])  # the second has no metric
 def test_a_solver_that_lies_is_harmless(monkeypatch, lie, rate):
-    monkeypatch.setattr(program, "solve", lying(LIES[lie]))
+    monkeypatch.setattr(cegis, "solve", lying(LIES[lie]))
     monkeypatch.setattr(cegis, "_ROUNDS", 8)
     asked = problem(TWO, TWO_BOX, rate)
     found = cegis.propose(asked)

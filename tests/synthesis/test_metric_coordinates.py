@@ -13,9 +13,8 @@ from tubecert.enclosure.tape import Tape
 from tubecert.model import build
 from tubecert.pipeline import Options
 from tubecert.spec import Synthesis, load_text
-from tubecert.synthesis.attempts import Request, routes
 from tubecert.synthesis.family import coordinates, metric_family
-from tubecert.synthesis.ladder import Ladder
+from tubecert.synthesis.ladder import Ladder, Request, routes
 from tubecert.synthesis.problem import FLOORS
 from tubecert.synthesis.rounding import distance, rounded
 from tubecert.verdict import Verdict

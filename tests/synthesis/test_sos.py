@@ -31,11 +31,10 @@ from tubecert.synthesis.chart import (
 from tubecert.synthesis.conic import Affine, ConicProgram, Semidefinite, solve, triangle
 from tubecert.synthesis.family import metric_family
 from tubecert.synthesis.frame import commuting_frame
-from tubecert.synthesis.gram import gram_form
 from tubecert.synthesis.lifting import lift
 from tubecert.synthesis.polynomial import polynomial_conditions
 from tubecert.synthesis.problem import SynthesisProblem
-from tubecert.synthesis.sos import propose_sos
+from tubecert.synthesis.sos import gram_form, propose_sos
 
 SOLVERS = ("clarabel", "scs")
 Q = Fraction

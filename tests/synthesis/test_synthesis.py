@@ -23,11 +23,10 @@ from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.spec import load
 from tubecert.spec.metric_file import with_metric
-from tubecert.synthesis import attempts, cegis, sos
-from tubecert.synthesis.attempts import Request
+from tubecert.synthesis import cegis, sos
 from tubecert.synthesis.diagnose import is_hurwitz, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, invariants, metric_family, suggested
-from tubecert.synthesis.ladder import Ladder, shrunk
+from tubecert.synthesis.ladder import Ladder, Request, routes, shrunk
 from tubecert.synthesis.problem import Proposal
 from tubecert.synthesis.rounding import Rejected, rounded, shortest_proven
 
@@ -244,7 +243,6 @@ def test_a_solver_that_breaks_down_has_proposed_nothing():
 @pytest.mark.parametrize("kind", ["negated", "nan", "nothing"])
 def test_a_lying_solver_writes_no_file(kind, tmp_path, monkeypatch):
     monkeypatch.setattr(cegis, "propose", liar(kind))
-    monkeypatch.setattr(attempts, "routes", lambda choice: (("cegis", cegis.propose),))
     from tubecert.pipeline import synthesis
 
     monkeypatch.setattr(synthesis, "routes", lambda choice: (("cegis", cegis.propose),))
@@ -373,5 +371,5 @@ def test_condition_numbers_are_within_a_thousandth_of_the_least(route, rate):
 def test_the_three_state_metric_is_as_good_as_that_of_plain_sums_of_squares(choice):
     """Degree 2 at rate .999: 1.4792 elsewhere."""
     three = load(str(ROOT / "configs" / "three_state.yaml"))
-    request = Request(model=build(three), safe_set=three.safe_set, routes=attempts.routes(choice), degree=2)
+    request = Request(model=build(three), safe_set=three.safe_set, routes=routes(choice), degree=2)
     assert Ladder(request).metric(Fraction("0.999")).condition_number.above <= 1.4792 * 1.001

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Literal
 
 from tubecert.bounds.clearance import Shape
 from tubecert.certificate.effective import Asked, Effective
@@ -19,10 +19,12 @@ from tubecert.claims.family import Assumption, Reason
 from tubecert.conditions.inputs import InputBound
 from tubecert.conditions.theorem import Recipe
 from tubecert.enclosure.constant import Constant, Witness
+from tubecert.enclosure.interval import Interval
 from tubecert.kinds.kind import Pair, SectionData
 from tubecert.kinds.table import KINDS
-from tubecert.records import FormError, from_json, keyed, to_json
+from tubecert.records import FormError, Json, from_json, keyed, to_json
 from tubecert.spec import Interpolation, Knots
+from tubecert.spec.metric_file import FORMAT
 from tubecert.spec.types import PlanKind
 from tubecert.verdict import Verdict
 
@@ -144,9 +146,6 @@ class InputData:
         low, high = self.limits
         ends = [end for bound in found for end in (bound.least, bound.greatest)]
         return max((float(abs(2 * Fraction(end) - low - high) / (high - low)) for end in ends), default=None)
-
-
-Json = Any
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -447,3 +446,43 @@ class Certificate:
             "notes": notes,
             "run": to_json(self.run),
         }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricFile:
+    """W and its rate in 1/s; on `verified_on`, lower I <= M <= upper I, and C2 holds with `margin` in 1/s to spare."""
+
+    format: str
+    rate: Fraction
+    dual_metric: tuple[tuple[str, ...], ...]
+    verified_on: Mapping[str, tuple[Fraction, Fraction]]
+    lower: Constant
+    upper: Constant
+    condition_number: Constant
+    solver: SolverData
+    margin: Constant | None = None
+
+    def to_json(self) -> Json:
+        """What the file holds."""
+        return to_json(self)
+
+
+def metric_file(
+    safe_set: Mapping[str, tuple[Fraction, Fraction]], metric: MetricData, solver: SolverData
+) -> MetricFile:
+    """The metric file of a metric that is proven on a safe set; raises `ValueError` if it is not."""
+    lower, upper = metric.lower_on_set, metric.upper_on_set
+    if lower is None or upper is None:
+        raise ValueError("a proven metric has bounds")
+    ratio = Interval(upper.below, upper.above) / Interval(lower.below, lower.above)
+    return MetricFile(
+        format=FORMAT,
+        rate=metric.rate,
+        dual_metric=metric.dual_metric,
+        verified_on=safe_set,
+        lower=lower,
+        upper=upper,
+        condition_number=Constant(below=float(ratio.lo), above=float(ratio.hi)).printable(),
+        solver=solver,
+        margin=metric.margin,
+    )

@@ -138,7 +138,7 @@ def _kept_metric(found: Certification | SampledCertification, target: str | None
     if target is None:
         return None
     from tubecert import certificate
-    from tubecert.certificate.metric_file import metric_file
+    from tubecert.certificate.result import metric_file
     from tubecert.library.certification import Certification
     from tubecert.verdict import Verdict
 

@@ -23,7 +23,7 @@ from tubecert.report.terminal import Terminal
 from tubecert.words.progress import came_to, described, next_step, out_of_reach
 
 if TYPE_CHECKING:
-    from tubecert.certificate.metric_file import MetricFile
+    from tubecert.certificate.result import MetricFile
     from tubecert.cli.adapter import Output
     from tubecert.pipeline.synthesised import Row, Synthesised
     from tubecert.report.page import Page

@@ -28,7 +28,7 @@ from tubecert.library.shown import Shown
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from tubecert.certificate.metric_file import MetricFile
+    from tubecert.certificate.result import MetricFile
     from tubecert.enclosure.constant import Constant
     from tubecert.library.plain import Data
     from tubecert.library.specification import File, Specifiable

@@ -21,8 +21,7 @@ from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Interval
 from tubecert.enclosure.objective import Objective
-from tubecert.enclosure.pencil import Definite, Pencil, scalar
-from tubecert.enclosure.projected import ProjectedPencil
+from tubecert.enclosure.pencil import Definite, Pencil, ProjectedPencil, scalar
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, is_zero
 from tubecert.expression.matrix import Matrix, determinant, identity, multiply, transpose

@@ -141,7 +141,7 @@ def synthesise(
     Raises `SpecError` for what makes the question meaningless, and for a solver that is not installed.
     """
     from tubecert.pipeline.synthesis import SynthesisRun  # solvers, only where they are needed
-    from tubecert.synthesis.bridge import required
+    from tubecert.synthesis.conic import required
 
     required(wanted.solver)
     spec = replace(overridden(spec, options), metric=None, synthesis=None)

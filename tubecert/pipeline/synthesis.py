@@ -57,10 +57,9 @@ from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options
 from tubecert.stages.question import Question
-from tubecert.synthesis.attempts import Request, routes
 from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError
-from tubecert.synthesis.ladder import Ladder
+from tubecert.synthesis.ladder import Ladder, Request, routes
 from tubecert.synthesis.problem import FLOORS, Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict

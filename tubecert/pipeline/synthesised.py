@@ -10,15 +10,21 @@ from fractions import Fraction
 from math import inf, log
 
 from tubecert.certificate.effective import Asked
-from tubecert.certificate.metric_file import MetricFile
-from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SearchData, SynthesisData
+from tubecert.certificate.result import (
+    AttemptData,
+    MetricFile,
+    MetricRow,
+    RateLimits,
+    SearchData,
+    SynthesisData,
+)
 from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Claim, Reason
 from tubecert.claims.statements import PlanBounded, PlanInSafeSet, StartInTube
 from tubecert.pipeline.deadline import Cut
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
-from tubecert.synthesis.attempts import Attempt
+from tubecert.synthesis.ladder import Attempt
 from tubecert.synthesis.problem import Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict

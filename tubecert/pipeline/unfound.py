@@ -19,9 +19,8 @@ from tubecert.claims.failures import (
 from tubecert.claims.family import Relax
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Spec
-from tubecert.synthesis.attempts import Attempt
 from tubecert.synthesis.family import suggested
-from tubecert.synthesis.ladder import Ladder
+from tubecert.synthesis.ladder import Attempt, Ladder
 from tubecert.verdict import Verdict
 
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import isfinite
 
-from tubecert.certificate.metric_file import MetricFile, metric_file
-from tubecert.certificate.result import SolverData
+from tubecert.certificate.result import MetricFile, SolverData, metric_file
 from tubecert.certificate.sections import metric_data
 from tubecert.claims.family import Reason
 from tubecert.claims.statements import MetricContraction, RankOfB

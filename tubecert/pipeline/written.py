@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import json
 
-from tubecert.certificate.metric_file import MetricFile, metric_file
-from tubecert.certificate.result import SolverData
+from tubecert.certificate.result import MetricFile, SolverData, metric_file
 from tubecert.certificate.sections import metric_data
 from tubecert.claims.advice import ConstantInputs, LowerDegree
 from tubecert.claims.family import Relax

@@ -12,7 +12,7 @@ formula or rounding in the producer must not pass both.
 | `identity` | terms that vanish identically, by polynomials over the rationals and the addition theorems |
 | `boxes` | what terms can be on a box: polynomials of second order, their vertices, and what they leave |
 | `statements` | norms, definiteness and signs at those vertices |
-| `pencils`, `multiplier`, `norms`, `lipschitz` | statements of other kinds: pencils, columns over a ball, kinks |
+| `pencils`, `norms`, `lipschitz` | statements of other kinds: pencils, columns over a ball, kinks |
 | `cover` | one claim; a claim over a domain, by splitting boxes that cover it |
 | `curve`, `tube` | the plan as segments that enclose it, or a family of plans; boxes around it |
 | `document`, `specified.numbers` | JSON and expressions, read and checked for form |

@@ -9,7 +9,6 @@ from functools import cached_property
 
 from flint import arb
 
-from tubecert.recheck.around import Ellipsoid, Round
 from tubecert.recheck.balls import Ball
 from tubecert.recheck.coordinates import Coordinates, Fields
 from tubecert.recheck.cover import Boxed, Outcome, in_turn, prove
@@ -18,7 +17,7 @@ from tubecert.recheck.specified.numbers import TIME, Numbers
 from tubecert.recheck.statements import NormsBelow, NotNegative, PositiveDefinite
 from tubecert.recheck.system import System
 from tubecert.recheck.terms import Matrix, Rows, Term, matrix_replaced, names, number, variable
-from tubecert.recheck.tube import Tube
+from tubecert.recheck.tube import Ellipsoid, Round, Tube
 
 
 @dataclass(frozen=True)

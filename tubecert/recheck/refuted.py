@@ -21,7 +21,7 @@ from flint import arb, ctx, fmpq, fmpq_mat
 
 from tubecert.recheck import metric, start
 from tubecert.recheck.balls import Ball, exact, floor, is_indefinite
-from tubecert.recheck.case import Case
+from tubecert.recheck.claims import Case
 from tubecert.recheck.cover import CONFIRMED, SHARP, Claim, Outcome, stated
 from tubecert.recheck.curve import Segment
 from tubecert.recheck.kinds.table import KEYS

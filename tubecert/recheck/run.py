@@ -8,9 +8,8 @@ from functools import partial
 
 from tubecert.errors import ExitCode
 from tubecert.recheck import refuted
-from tubecert.recheck.case import Case
 from tubecert.recheck.certificate import read_certificate
-from tubecert.recheck.claims import of_certified, of_every
+from tubecert.recheck.claims import Case, of_certified, of_every
 from tubecert.recheck.cover import Claim, Memory, Outcome, stated, telling, time_is_up, within
 from tubecert.recheck.document import SAMPLED_LOOP, Node, read
 from tubecert.recheck.result import Certificate

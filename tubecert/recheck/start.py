@@ -11,7 +11,6 @@ from itertools import product
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.around import Round
 from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root, sharp_norm
 from tubecert.recheck.cover import CONFIRMED, Boxed, Outcome, prove, stated, together
 from tubecert.recheck.curve import Curve, Part
@@ -31,7 +30,7 @@ from tubecert.recheck.terms import (
     plus,
     variable,
 )
-from tubecert.recheck.tube import Tube
+from tubecert.recheck.tube import Round, Tube
 from tubecert.recheck.wind import adapted, joins
 
 _PIECES = (1, 16, 128, 1024, 4096)

@@ -1,21 +1,255 @@
 """The tube: all states around the plan, as a domain that cuts boxes and tells which lie outside.
 
 A box of states is compared with segments of the plan: what the offsets between them can be is cut to what the tube is
-around one point (`around`: a ball, or an ellipsoid with half-widths). Segments are halved while they are
+around one point (a ball, or an ellipsoid with half-widths). Segments are halved while they are
 long against the box. Where a test depends on t or on u*, time is a coordinate and selects the segments.
+
+What the tube is around one point of the plan: a ball, or an ellipsoid cut to half-widths, as boxes see it.
+
+Offsets are x - x*. Asked is about some of the states, `which`: then what is known is the projection of the set to them.
+Implements: theory (0.3), (1.6).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 
 from flint import arb
 
-from tubecert.recheck.around import Around
-from tubecert.recheck.balls import Ball, ceiling, floor
+from tubecert.recheck.balls import Ball, ceiling, exact, floor, length, root
+from tubecert.recheck.coordinates import Coordinates, inverted, product
 from tubecert.recheck.cover import Domain, Range, State, as_ball
 from tubecert.recheck.curve import Curve, Segment
+from tubecert.recheck.specified.numbers import Numbers, Rows
+
+Ranges = list[tuple[float, float]]
+
+# floats are correctly rounded: what they lose over a few operations is far below these factors
+_LESS, _MORE = 1 - 1e-14, 1 + 1e-14
+_SLACK = 4e-14  # relative to the sum of magnitudes: sums of at most 64 terms
+_INNER = 1 - 1e-9
+_TINY = 1e-280
+
+
+class Round:
+    """|x - x*| <= rho."""
+
+    def __init__(self, rho: Fraction) -> None:
+        self._rho = exact(rho)
+        self._square = math.nextafter(float(rho * rho), math.inf)
+
+    def extent(self, state: int) -> float:
+        """The radius."""
+        del state
+        return ceiling(self._rho)
+
+    def near(self, which: Sequence[int], offsets: Ranges) -> Ranges | None:
+        """Smaller ranges with the same points of the set, None if there are none: each by the gaps in all others."""
+        del which
+        squares = []
+        for lo, hi in offsets:
+            gap = max(0.0, lo, -hi) * _LESS
+            squares.append(gap * gap * _LESS)
+        if sum(squares) * _LESS > self._square:
+            return None
+        found = []
+        for place in range(len(offsets)):
+            others = sum(squares[:place]) + sum(squares[place + 1 :])
+            half = math.sqrt(max(0.0, self._square - others * _LESS)) * _MORE
+            found.append((-half, half))
+        return found
+
+    def crosses(self, which: Sequence[int], far: Sequence[float]) -> bool:
+        """Whether a box with such largest |offsets| may reach beyond the set, by its farthest corner; it steers."""
+        del which
+        return sum(x * x for x in far) > self._square
+
+    def inside(self, which: Sequence[int], offset: Sequence[Ball]) -> list[Ball] | None:
+        """An offset moved along the radius into the set; None if it could not be shown to lie there."""
+        del which
+        size = length(offset)
+        scale = 1.0
+        if not size <= self._rho:
+            scale = float((self._rho / size.upper()).lower()) * _INNER if size > 0 else 0.0
+        moved = [z * scale for z in offset]
+        return moved if length(moved) <= self._rho else None
+
+    def form(self, which: Sequence[int]) -> Rows:
+        """Q with y'Q y <= rho^2 on the projection: the identity."""
+        return tuple(tuple(Fraction(i == j) for j in which) for i in which)
+
+    def directions(self, which: Sequence[int]) -> list[list[float]]:
+        """C with C C' = Q^-1, in floats: a proposal."""
+        return [[float(i == j) for j in which] for i in which]
+
+
+class Ellipsoid:
+    """|S (x - x*)| <= rho and |x_i - x*_i| <= sides_i.
+
+    The projection of the ellipsoid to some states is y'Q y <= rho^2 with Q the inverse of their block of (S'S)^-1, and
+    y'Q y = sum_k d_k r_k^2, r_k = y_k + sum_(j > k) l_kj y_j with exact d_k and l_kj.
+    """
+
+    def __init__(self, coordinates: Coordinates, rho: Fraction, sides: Numbers) -> None:
+        self._spread, self._rho, self._sides = coordinates.spread, rho, sides
+        self._square = math.nextafter(float(rho * rho), math.inf)
+        self._forms: dict[tuple[int, ...], _Form] = {}
+        whole = [ceiling(exact(rho) * root(exact(row[i]))) for i, row in enumerate(self._spread)]
+        self._extents = [min(reach, ceiling(exact(side))) for reach, side in zip(whole, sides, strict=True)]
+
+    def extent(self, state: int) -> float:
+        """The half-width, or what the ellipsoid leaves."""
+        return self._extents[state]
+
+    def _form(self, which: Sequence[int]) -> _Form:
+        key = tuple(which)
+        if key not in self._forms:
+            self._forms[key] = _Form(self._spread, key)
+        return self._forms[key]
+
+    def near(self, which: Sequence[int], offsets: Ranges) -> Ranges | None:
+        """To the half-widths; then each row by what the others leave of rho^2."""
+        found = []
+        for i, (lo, hi) in zip(which, offsets, strict=True):
+            side = self.extent(i)
+            low, high = max(lo, -side), min(hi, side)
+            if low > high:
+                return None
+            found.append((low, high))
+        return self._form(which).near(found, self._square) if which else found
+
+    def crosses(self, which: Sequence[int], far: Sequence[float]) -> bool:
+        """The largest values of the rows, and the half-widths."""
+        if any(x > float(self._sides[i]) for i, x in zip(which, far, strict=True)):
+            return True
+        return bool(which) and self._form(which).most(far) > self._square
+
+    def inside(self, which: Sequence[int], offset: Sequence[Ball]) -> list[Ball] | None:
+        """Along the radius; the other states follow such that |S x| is least, and must keep their half-widths."""
+        if not which:
+            return []
+        form, rho = self._form(which), exact(self._rho)
+        size = root(form.value(offset))
+        over = [abs(y) / exact(self._sides[i]) for i, y in zip(which, offset, strict=True)]
+        excess = max(float((size / rho).upper()), *(float(x.upper()) for x in over))
+        if not math.isfinite(excess):
+            return None
+        scale = 1.0 if excess <= 1 else _INNER / excess
+        moved = [y * scale for y in offset]
+        whole = form.completed(moved)
+        kept = all(abs(y) <= exact(side) for y, side in zip(whole, self._sides, strict=True))
+        return moved if kept and form.value(moved) <= rho * rho else None
+
+    def form(self, which: Sequence[int]) -> Rows:
+        """The inverse of the block of (S'S)^-1."""
+        return self._form(which).Q
+
+    def directions(self, which: Sequence[int]) -> list[list[float]]:
+        """The block's own factor."""
+        return self._form(which).directions
+
+
+Around = Round | Ellipsoid
+
+
+class _Form:
+    """y'Q y for some of the states, exactly and in floats."""
+
+    def __init__(self, spread: Rows, which: tuple[int, ...]) -> None:
+        block = tuple(tuple(spread[i][j] for j in which) for i in which)
+        self.Q = Q = inverted(block)
+        weights, rows = _squares(block)
+        # block = sum_k d_k r_k r_k'
+        self.directions = [
+            [math.sqrt(float(d)) * float(row[i]) for d, row in zip(weights, rows, strict=True)]
+            for i in range(len(block))
+        ]
+        self._weights, self._rows = _squares(Q)
+        self._least = [math.nextafter(float(d), 0.0) for d in self._weights]
+        self._floats = [[float(l) for l in row] for row in self._rows]
+        n = range(len(which))
+        self._others = [[[0.0 if i == j else row[i] for i in n] for j in n] for row in self._floats]
+        if any(l and abs(float(l)) < _TINY for row in self._rows for l in row):
+            raise ValueError("the tube is too narrow in one direction for floats")
+        columns = [[Q[i][j] for i in n] for j in n]
+        self._completion = [
+            [product([row[i] for i in which], column) for column in columns] for row in spread
+        ]
+
+    def value(self, y: Sequence[Ball]) -> Ball:
+        """y'Q y."""
+        total = arb(0)
+        for d, row in zip(self._weights, self._rows, strict=True):
+            r = sum((exact(l) * x for l, x in zip(row, y, strict=True)), start=arb(0))
+            total = total + exact(d) * r * r
+        return total
+
+    def completed(self, y: Sequence[Ball]) -> list[Ball]:
+        """All offsets with these entries, |S x| least: spread_(:,V) Q y."""
+        return [
+            sum((exact(c) * x for c, x in zip(row, y, strict=True)), start=arb(0)) for row in self._completion
+        ]
+
+    def most(self, far: Sequence[float]) -> float:
+        """What y'Q y can be for such |y|."""
+        rows = (sum(abs(l) * x for l, x in zip(row, far, strict=True)) for row in self._floats)
+        return sum(d * r * r for d, r in zip(self._least, rows, strict=True))
+
+    def near(self, ranges: Ranges, square: float) -> Ranges | None:
+        """Ranges cut to what y'Q y <= square leaves; None if it leaves nothing."""
+        now = list(ranges)
+        sums = [_sum(row, now) for row in self._floats]
+        least = [max(0.0, lo, -hi) for lo, hi in sums]
+        gaps = [d * (gap * gap) * _LESS for d, gap in zip(self._least, least, strict=True)]
+        if sum(gaps) * _LESS > square:
+            return None
+        for k, row in enumerate(self._floats):
+            others = sum(gaps[:k]) + sum(gaps[k + 1 :])
+            room = max(0.0, square - others * _LESS)
+            reach = math.sqrt(room / self._least[k]) * _MORE if self._least[k] > 0 else math.inf
+            for j, weight in enumerate(row):
+                if weight == 0 or not math.isfinite(reach):
+                    continue
+                rest = _sum(self._others[k][j], now)
+                size = max(abs(rest[0]), abs(rest[1])) + reach
+                ends = sorted(((-reach - rest[1]) / weight, (reach - rest[0]) / weight))
+                blur = size / abs(weight) * _SLACK
+                low, high = max(now[j][0], ends[0] - blur), min(now[j][1], ends[1] + blur)
+                if low > high:
+                    return None
+                now[j] = low, high
+        return now
+
+
+def _sum(row: Sequence[float], ranges: Ranges) -> tuple[float, float]:
+    """sum_j row_j y_j over ranges, outward; the row's entries are off by a rounding each."""
+    lo = hi = size = 0.0
+    for weight, (low, high) in zip(row, ranges, strict=True):
+        a, b = weight * low, weight * high
+        lo, hi = lo + min(a, b), hi + max(a, b)
+        size += max(abs(a), abs(b))
+    return lo - size * _SLACK, hi + size * _SLACK
+
+
+def _squares(Q: Rows) -> tuple[list[Fraction], list[list[Fraction]]]:
+    """d and l with y'Q y = sum_k d_k (sum_j l_kj y_j)^2, l_kk = 1, l_kj = 0 for j < k; Q is positive definite."""
+    n = len(Q)
+    rest = [list(row) for row in Q]
+    weights, rows = [], []
+    for k in range(n):
+        d = rest[k][k]
+        if d <= 0:
+            raise ValueError("the tube is not bounded")
+        row = [Fraction(0)] * k + [rest[k][j] / d for j in range(k, n)]
+        weights.append(d)
+        rows.append(row)
+        for i in range(k, n):
+            for j in range(k, n):
+                rest[i][j] -= d * row[i] * row[j]
+    return weights, rows
+
 
 TIME = "t"
 

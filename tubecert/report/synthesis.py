@@ -12,8 +12,7 @@ from tubecert.report.claimed import place
 from tubecert.report.page import Block, Facts, Items, Page, Section, Table, Words
 
 if TYPE_CHECKING:
-    from tubecert.certificate.metric_file import MetricFile
-    from tubecert.certificate.result import AttemptData, MetricRow, RateLimits, SearchData
+    from tubecert.certificate.result import AttemptData, MetricFile, MetricRow, RateLimits, SearchData
 
 FLOORS = {"identity": "condition", "input": "input gain"}
 _SHOWN = 12  # attempts

@@ -4,10 +4,10 @@
 |---|---|
 | `family`, `frame`, `lifting` | matrices W(x) that satisfy C3 exactly, for any B; what measures them |
 | `problem` | what a route is asked, and answers |
-| `forms`, `conic`, `bridge` | the conditions as matrices in the coefficients, sign symmetries; semidefinite programs |
-| `cegis`, `program`, `attack` | route: conditions at points, and where they fail |
-| `sos`, `polynomial`, `chart`, `gram` | route: sums of squares |
+| `forms`, `conic` | the conditions as matrices in the coefficients, sign symmetries; semidefinite programs |
+| `cegis`, `attack` | route: conditions at points, and where they fail |
+| `sos`, `polynomial`, `chart` | route: sums of squares |
 | `rounding` | floats -> few digits, proven |
-| `ladder`, `attempts` | degrees, routes and back-offs until a proof succeeds; searches over rates and boxes |
+| `ladder` | degrees, routes and back-offs until a proof succeeds; searches over rates and boxes |
 | `diagnose` | uncontrollable modes: why there is no metric |
 """

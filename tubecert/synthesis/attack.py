@@ -27,8 +27,7 @@ from tubecert.enclosure.domain import BoxDomain
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import finite, whitening
 from tubecert.enclosure.objective import Objective
-from tubecert.enclosure.pencil import Definite, Pencil
-from tubecert.enclosure.projected import ProjectedPencil
+from tubecert.enclosure.pencil import Definite, Pencil, ProjectedPencil
 from tubecert.expression.matrix import multiply, transpose
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.forms import FormsTape, canonical
