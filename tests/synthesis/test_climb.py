@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from tubecert import pipeline
-from tubecert.claims.advice import ConstantInputs
+from tubecert.claims.advice import ConstantInputs, MeasureTube
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.statements import TubeInSafeSet
 from tubecert.cli.app import app
@@ -99,6 +99,22 @@ def test_where_nothing_certifies_nothing_is_written(tmp_path):
     assert isinstance(failure.slow, TubeInSafeSet)
     assert failure.slowest < failure.fastest
     assert found.file is None
+
+
+@pytest.mark.slow
+def test_where_radii_of_unlike_states_do_not_serve_another_tube_is_tried_and_told():
+    text = (ROBOTS / "pendulum.yaml").read_text()
+    text = text.replace("epsilon: 0.1", "epsilon: 100").replace("[u]", "[u]\n  units: {q: rad, w: rad/s}")
+    found = pipeline.synthesise(load_text(text), BARE, BY_B)
+    (told,) = found.reason.relax
+    assert isinstance(told, MeasureTube)
+    widths = ", ".join(f"{name}: {width}" for name, width in told.half_widths.items())
+    tube = text[text.index("tube: {") :].split("}")[0] + "}"
+    again = pipeline.synthesise(
+        load_text(text.replace(tube, f"tube: {{half_widths: {{{widths}}}}}")), BARE, BY_B
+    )
+    assert again.verdict is Verdict.CERTIFIED
+    assert any(row.counts for row in again.rows)
 
 
 @pytest.mark.slow

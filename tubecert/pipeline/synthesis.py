@@ -17,6 +17,7 @@ from tubecert.claims.advice import (
     EnlargeSafeSet,
     GiveInput,
     LowerRate,
+    MeasureTube,
     OtherVariables,
     RaiseBudget,
     RaiseConditionNumber,
@@ -50,7 +51,7 @@ from tubecert.pipeline.unfound import (
     remedies,
     tried,
 )
-from tubecert.pipeline.width import half_widths, measure_in
+from tubecert.pipeline.width import half_widths, measure_in, otherwise
 from tubecert.pipeline.written import TooLongError, file_of, read_back, shorter
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.spec import Spec, Synthesis
@@ -150,7 +151,11 @@ class SynthesisRun:
         except (OutOfTime, KeyboardInterrupt) as end:
             best = self._so_far(end)
         if best is None:
-            return self._explained()
+            try:
+                return self._explained()
+            except OutOfTime as end:
+                self._so_far(end)
+                return self._explained()
         if table and not self.rows and not self.cut:
             self._over_rates(best.rate)
         return self._written(best)
@@ -357,8 +362,30 @@ class SynthesisRun:
         if self.cut == "plan":
             mends = [row.mend for row in self.rows.values() if row.mend is not None]
             return self._failed(failure, *sorted(mends, key=lambda mend: mend.share)[:1])
+        if (tube := self._other_tube()) is not None:
+            return self._failed(failure, tube)
         small = isinstance(failure.slow, TubeInSafeSet)
         return self._failed(failure, *((ReduceRadii(), EnlargeSafeSet()) if small else ()))
+
+    def _other_tube(self) -> MeasureTube | None:
+        """A tube that certifies with one of the metrics, where radii measure states that are unlike."""
+        rows = [row for row in self.rows.values() if row.floor == "identity"] if self.cut is None else []
+        judging = replace(self._judging(), epsilon=None, rho_a=None)
+        for spec in otherwise(self.spec) if rows else ():
+            self._say("trying another tube")
+            own = [
+                judged_row(row, self.ask(read_back(spec, row.metric), judging, self._watch, self.memory))
+                for row in rows
+            ]
+            best = min(
+                (row for row in own if row.counts), key=lambda row: row.score("adaptation"), default=None
+            )
+            if best is not None:
+                widths = dict(spec.tube.half_widths)
+                return MeasureTube(
+                    half_widths=widths, bandwidth=best.bandwidth, adaptation_rate=best.adaptation_rate
+                )
+        return None
 
     def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
         """The mode that leaves nothing above the rate, if there is one."""

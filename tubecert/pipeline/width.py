@@ -1,13 +1,18 @@
-"""How wide a tube is proven to be: what metrics are ranked by where outputs are named."""
+"""How wide a tube is: what metrics are ranked by where outputs are named, and other tubes where radii do not serve."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import inf
+from typing import Final
 
+from tubecert.enclosure.constant import round_down
 from tubecert.spec import Spec
+
+_SHARES: Final = (Fraction(1, 2), Fraction(1, 4))  # of the safe set: widths that are tried
+_MANY, _APART = 4, 4  # states, and their ranges, that make radii doubtful
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,3 +38,23 @@ def half_widths(spec: Spec) -> tuple[Fraction, ...]:
     if all(name in asked for name in spec.states):
         return tuple(asked[name] for name in spec.states)
     return tuple((high - low) / 2 for low, high in spec.safe_set)
+
+
+def otherwise(spec: Spec) -> Iterator[Spec]:
+    """The specification with other tubes, where its radii measure states that differ in unit or scale.
+
+    The same radii in coordinates of the tube, if it is a ball; then half-widths, as shares of the safe set.
+    """
+    tube, units, sizes = spec.tube, dict(spec.units), half_widths(spec)
+    known = {units[name] for name in spec.states if name in units}
+    alike = len(spec.states) < _MANY and len(known) < 2 and max(sizes) < _APART * min(sizes)
+    if tube.half_widths or alike:
+        return
+    if not tube.auto:
+        yield replace(spec, tube=replace(tube, coordinates="auto"))
+    for share in _SHARES:
+        widths = tuple(round_down(float(share * size), 2) for size in sizes)
+        asked = tuple(zip(spec.states, widths, strict=True))
+        yield replace(
+            spec, tube=replace(tube, epsilon=None, rho_a=None, coordinates="auto", half_widths=asked)
+        )
