@@ -332,7 +332,7 @@ def test_an_interruption_tells_what_was_tried_where_nothing_certified(monkeypatc
     done = run(hopeless, "-o", target)
     assert done.exit_code == 130
     assert "interrupted: no metric that certifies was found by then" in done.stdout
-    assert "condition number" in done.stdout
+    assert "kappa" in done.stdout
     assert "reduce epsilon" in done.stdout
     assert target.read_text() == "older"
 

@@ -224,9 +224,9 @@ def _drawn(result: Result) -> Iterator[Block]:
 
 def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, str]]:
     """What the first section does not say of it."""
-    yield "radius rho", reach.radii(tube)
     yield "epsilon", short(tube.epsilon)
     if tube.coordinates is not None:
+        yield "radius rho", reach.radii(tube)
         yield (
             "measured by",
             "z = S x, in which rho, rho_a and epsilon are lengths, whatever the units of states",

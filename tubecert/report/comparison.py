@@ -6,11 +6,9 @@ that its certificate states. What a certificate does not have is shown as missin
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from io import StringIO
 from math import isfinite
 from pathlib import PurePath
 from typing import Final
@@ -22,7 +20,16 @@ from tubecert.records import exact_json
 from tubecert.report.claimed import NOT_RECHECKED, size
 from tubecert.report.gains import gains_text
 from tubecert.report.page import Cell, Facts, Page, Section, Table
-from tubecert.report.quantities import AnyCertificate, AnyResult, Quantity, Value, failed, merged, quantities
+from tubecert.report.quantities import (
+    AnyCertificate,
+    AnyResult,
+    Quantity,
+    Value,
+    failed,
+    merged,
+    quantities,
+    table_text,
+)
 from tubecert.sampled_loop.record import Result as SampledResult
 from tubecert.words.sampled_loop import NOTHING
 
@@ -87,16 +94,12 @@ class Comparison:
 
     def csv(self) -> str:
         """As comma-separated values; what a certificate has not is empty."""
-        text = StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["quantity", *self.names])
-        for key, values in self.rows():
-            shown = ("" if v is None else v if isinstance(v, str) else exact(v) for v in values)
-            writer.writerow([key, *shown])
-        for path, own in self.differences.items():
-            shown = ("" if v is None else v if isinstance(v, str) else _bracketed(v) for v in own)
-            writer.writerow([f"{_SPECIFICATION}.{path}", *shown])
-        return text.getvalue()
+        differing = (
+            [f"{_SPECIFICATION}.{path}", *(None if v is None else _bracketed(v) for v in own)]
+            for path, own in self.differences.items()
+        )
+        rows = ([key, *values] for key, values in self.rows())
+        return table_text([["quantity", *self.names], *rows, *differing])
 
     def json(self) -> dict[str, object]:
         """As values of JSON."""
@@ -128,8 +131,8 @@ def page_of(comparison: Comparison) -> Page:
 def _sections(comparison: Comparison) -> Iterator[Section]:
     plain = [each for each in comparison.quantities if not each.section]
     kinds = dict.fromkeys(each.section for each in comparison.quantities if each.section)
-    rows = [*_verdicts(comparison), *(_quantity(comparison, each) for each in plain if _at_a_glance(each))]
-    rows += (_kind(comparison, key) for key in kinds)
+    rows = [*_verdicts(comparison), *(_kind(comparison, key) for key in kinds)]
+    rows += (_quantity(comparison, each) for each in plain if _at_a_glance(each))
     keys = Facts.of([("differ", ", ".join(comparison.differences))], ("differ",))
     differ = (keys,) if comparison.differences else ()
     yield Section(key="glance", title="At a glance", blocks=(_table(comparison, rows), *differ))
@@ -249,7 +252,7 @@ def _differing_in(values: Sequence[Tree], path: str) -> Iterator[tuple[str, tupl
 
 def _compact(value: Tree) -> str:
     """A value of a specification in a cell."""
-    text = MISSING if value is None else value if isinstance(value, str) else _bracketed(value)
+    text = MISSING if value is None else _bracketed(value)
     return text if len(text) <= _LONG else f"{text[: _LONG - 1]}…"
 
 

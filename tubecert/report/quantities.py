@@ -6,15 +6,18 @@ with the name of its section; its gains and margins are what the section tells (
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from fractions import Fraction
+from io import StringIO
 from math import isfinite
 from typing import TypeAlias
 
 from tubecert.certificate.result import Certificate, Result
 from tubecert.claims.conditions import SECTIONS, condition_name
 from tubecert.claims.family import Claim
+from tubecert.digits import exact
 from tubecert.kinds.kind import Pair, SectionData
 from tubecert.kinds.table import KINDS
 from tubecert.report.gains import ROLES
@@ -66,14 +69,9 @@ class Quantity:
     def words(self) -> str:
         """What it is called in tables and figures."""
         what = self.name.rpartition(".")[2] if self.share else self.name
-        what = (
-            f"margin {condition_name(what)}"
-            if self.share
-            else _SYMBOLS.get(what, what.replace("_", " ").replace(".", " of "))
-        )
-        role = next(
-            (words for role, words in ROLES.items() if role == self.role), self.role.replace("_", " ")
-        )
+        plain = _SYMBOLS.get(what, what.replace("_", " ").replace(".", " of "))
+        what = f"margin {condition_name(what)}" if self.share else plain
+        role = next((words for role, words in ROLES.items() if role == self.role), "")
         parts = [SECTIONS.get(self.section, self.section), "" if self.role == "feedback" else role, what]
         return ", ".join(part for part in parts if part)
 
@@ -160,3 +158,14 @@ def merged(rows: Iterable[Iterable[Quantity]]) -> list[Quantity]:
                 order.insert(before, each.key)
             before = order.index(each.key) + 1
     return [first[key] for key in order]
+
+
+def table_text(rows: Iterable[Iterable[Value]]) -> str:
+    """Rows as comma-separated values, every digit of numbers; what is not there is empty."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    for row in rows:
+        writer.writerow(
+            "" if cell is None else cell if isinstance(cell, str) else exact(cell) for cell in row
+        )
+    return text.getvalue()

@@ -91,17 +91,15 @@ def _screen(result: Result, notes: Notes) -> Iterator[Block]:
     """What is seen first."""
     effective = result.spec.effective
     plans = [("plans", family(effective))] if effective.trajectory.kind == "any" else []
-    yield _facts([("loop", loop(effective)), *plans, ("start", _start(result))])
+    yield Facts.of([("loop", loop(effective)), *plans, ("start", _start(result))])
     if result.tube:
         yield _widths(result, _first(result))
     proven = result.verdict is Verdict.CERTIFIED
     told = (*_inputs(result), *_worst(result, notes), *_obstacles(result)) if proven else ()
     if rows := [*told, *_lacking(result, notes)]:
-        yield _facts(rows)
-
-
-def _facts(rows: Sequence[tuple[str, str]]) -> Facts:
-    return Facts(facts=tuple((name, Cell(text=told)) for name, told in rows))
+        yield Facts.of(
+            rows, tuple(name for name, _ in rows if name.startswith("fills") or name == "obstacles")
+        )
 
 
 def _first(result: Result) -> Sequence[str]:
@@ -195,4 +193,4 @@ def _origin(certificate: Certificate) -> Facts:
     rows += [
         (name, str(told)) for name, told in sorted(certificate.run.items()) if not isinstance(told, dict)
     ]
-    return _facts(rows)
+    return Facts.of(rows)

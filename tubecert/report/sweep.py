@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from io import StringIO
 from typing import TYPE_CHECKING, Final
 
-from tubecert.digits import exact, up
+from tubecert.digits import up
 from tubecert.report.claimed import size
 from tubecert.report.gains import deciding
 from tubecert.report.page import Page, Section, Table
-from tubecert.report.quantities import Quantity, Value, failed, merged, quantities
+from tubecert.report.quantities import Quantity, Value, failed, merged, quantities, table_text
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sweep.grid import Axis
 from tubecert.sweep.point import Failed, Kept, Point
@@ -118,14 +116,7 @@ class SweepTable:
 
     def csv(self) -> str:
         """As comma-separated values; what a point has not is empty."""
-        text = StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(self.header)
-        for cells in self.cells():
-            writer.writerow(
-                "" if cell is None else cell if isinstance(cell, str) else exact(cell) for cell in cells
-            )
-        return text.getvalue()
+        return table_text([self.header, *self.cells()])
 
 
 def _lacking(outcome: Certificate | SampledCertificate) -> str:

@@ -14,11 +14,11 @@ from tubecert.report.page import Block, Facts, Items, Page, Section, Table, Word
 if TYPE_CHECKING:
     from tubecert.certificate.result import AttemptData, MetricFile, MetricRow, RateLimits, SearchData
 
-FLOORS = {"identity": "condition", "input": "input gain"}
+FLOORS = {"identity": "kappa", "input": "input gain"}
 _SHOWN = 12  # attempts
 _COLUMNS = (
-    "rate in 1/s, omega in rad/s; omega and Gamma are those of certificate B. beta/sqrt(a): how strongly the metric "
-    "lets inputs act over the tube (tubecert explain 'beta/sqrt(a)')."
+    "rate in 1/s, omega in rad/s, kappa: condition number; omega and Gamma are those of certificate B. beta/sqrt(a): "
+    "how strongly the metric lets inputs act over the tube (tubecert explain 'beta/sqrt(a)')."
 )
 _HARDLY = 1.05  # times as much
 _BEST: Final = "this is the best of what was proven by then"
@@ -110,7 +110,7 @@ def _limits(limits: RateLimits) -> Iterator[str]:
 
 def _compared(found: Sequence[MetricRow]) -> Table:
     """A metric a row."""
-    heads = ["least", ">condition number", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "!verdict"]
+    heads = ["least", ">kappa", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "!verdict"]
     degrees = len({row.degree for row in found}) > 1  # else all rows of a rate differ by what is least
     rows = (
         (

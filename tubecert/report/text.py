@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _MOST: Final = 15  # lines of a first screen
 _FEWEST: Final = 2  # rows of a table that is cut
 _LABELS: Final = 12  # characters of the names before values
+_FEW, _MANY = 5, 8  # columns of a table whose heads have room, and of one that has little
 _COLORS: Final = {"certified": "green", "refuted": "red", "undecided": "yellow"}
 _ASCII: Final = str.maketrans(
     {"ω": "omega", "Γ": "Gamma", "ρ": "rho", "λ": "lambda", "±": "+-", "≤": "<=", "≥": ">=", "…": "..."}
@@ -144,16 +145,23 @@ def _facts(rows: Sequence[tuple[str, RenderableType]]) -> Grid:
 
 
 def _table(block: Table) -> Grid:
-    """A table without lines, of which the column with the longest text is wrapped."""
-    widest = [max((len(cell.text) for cell in column), default=0) for column in zip(*block.rows, strict=True)]
-    grid = Grid(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+    """A table without lines: numbers stay whole, long texts are wrapped; of many columns heads as well."""
+    from textwrap import wrap
+
+    many = len(block.columns)
+    gap = 2 if many < _MANY else 1
+    grid = Grid(box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="dim")
     grid.show_header = any(block.columns)
-    for i, column in enumerate(block.columns):
-        number = bool(block.rows) and block.rows[0][i].kind == "number"
+    cells = list(zip(*block.rows, strict=True)) or [()] * many
+    for i, (head, column) in enumerate(zip(block.columns, cells, strict=True)):
+        width = max((len(cell.text) for cell in column), default=0)
+        number = bool(column) and column[0].kind == "number"
         justify: Literal["left", "right"] = "right" if number else "left"
-        wrapped = bool(widest) and widest[i] == max(widest)
-        grid.add_column(column.translate(_ASCII), justify=justify, overflow="fold", no_wrap=not wrapped)
-    grid.columns[0].min_width = _LABELS - 2
+        words = head.translate(_ASCII)
+        if many > _FEW:
+            words = "\n".join(wrap(words, max(width, 1), break_long_words=False))
+        grid.add_column(words, justify=justify, overflow="fold", no_wrap=number or width <= _LABELS)
+        grid.columns[i].min_width = None if i or number else _LABELS - 2
     for row in block.rows:
         grid.add_row(*map(_cell, row))
     return grid
