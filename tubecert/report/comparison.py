@@ -26,6 +26,7 @@ from tubecert.report.quantities import (
     Quantity,
     Value,
     failed,
+    lacking,
     merged,
     quantities,
     table_text,
@@ -154,7 +155,8 @@ def _verdicts(comparison: Comparison) -> Iterator[tuple[Cell, ...]]:
     found = [side.result for side in comparison.sides]
     yield _row("verdict", [Cell(text=str(own.verdict), kind="verdict") for own in found])
     if any(map(failed, found)):
-        yield _row("not proven", [Cell(text=failed(own)) for own in found])
+        told = (lacking(own) if failed(own) else "" for own in found)
+        yield _row("not proven", [Cell(text=text) for text in told])
 
 
 def _kind(comparison: Comparison, key: str) -> tuple[Cell, ...]:

@@ -25,6 +25,7 @@ from tubecert.report.outline import widths
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sampled_loop.record import Result as SampledResult
 from tubecert.verdict import Verdict
+from tubecert.words.sampled_loop import promise
 
 AnyCertificate: TypeAlias = Certificate | SampledCertificate
 AnyResult: TypeAlias = Result | SampledResult
@@ -94,6 +95,13 @@ def failed(result: AnyResult) -> str:
         return " ".join(f"{lack.kind}:{lack.where}".removesuffix(":") for lack in result.lacks)
     found = [_id(reason.claim) for reason in result.reasons if reason.verdict is not Verdict.CERTIFIED]
     return " ".join(dict.fromkeys(found))
+
+
+def lacking(result: AnyResult) -> str:
+    """The same in words."""
+    if isinstance(result, SampledResult):
+        return promise(result)
+    return "; ".join(dict.fromkeys(reason.claim.title for reason in result.failed))
 
 
 def _of_tube(result: Result) -> Iterator[Quantity]:

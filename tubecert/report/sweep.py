@@ -10,12 +10,11 @@ from tubecert.digits import up
 from tubecert.report.claimed import size
 from tubecert.report.gains import deciding
 from tubecert.report.page import Page, Section, Table
-from tubecert.report.quantities import Quantity, Value, failed, merged, quantities, table_text
+from tubecert.report.quantities import Quantity, Value, failed, lacking, merged, quantities, table_text
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sweep.grid import Axis
 from tubecert.sweep.point import Failed, Kept, Point
 from tubecert.verdict import Verdict
-from tubecert.words.sampled_loop import promise
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Certificate
@@ -49,7 +48,7 @@ class Row:
             point=point,
             verdict=str(result.verdict),
             failed=failed(result),
-            why=_lacking(outcome),
+            why=lacking(result),
             found={each.key: each for each in quantities(result)},
             gains=_found(outcome),
             sampled=isinstance(outcome, SampledCertificate),
@@ -117,13 +116,6 @@ class SweepTable:
     def csv(self) -> str:
         """As comma-separated values; what a point has not is empty."""
         return table_text([self.header, *self.cells()])
-
-
-def _lacking(outcome: Certificate | SampledCertificate) -> str:
-    """What is not proven, in words."""
-    if isinstance(outcome, SampledCertificate):
-        return promise(outcome.result)
-    return "; ".join(dict.fromkeys(reason.claim.title for reason in outcome.result.failed))
 
 
 def _found(outcome: Certificate | SampledCertificate) -> str:
