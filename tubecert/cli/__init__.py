@@ -5,14 +5,11 @@ Until a command runs, nothing but typer and the error family is imported: `--hel
 
 | module | what it does |
 |---|---|
-| `process` | signals, and an exit code that nobody else decides on |
-| `keeper`, `telling` | a command that can be ended at any moment, and what it told by then |
-| `app` | the commands and their options |
-| `options` | the options that every command shares; numbers from the command line |
-| `targets` | files that commands write |
-| `guard`, `presenting` | every way a command can end -> one exit code and no traceback; reports or data |
-| `everyday`, `synthesising`, `simulating` | commands beside certify: their options |
-| `certify`, `check`, `simulate`, `version`, ... | what each command does |
+| `process`, `keeper` | signals, exit codes, a command that can be ended at any moment |
+| `telling` | what a command tells by then, and shows at the end; which files it must not overwrite |
+| `app`, `adapter` | questions and their words as commands; the options that all share |
+| `guard` | every way a command can end -> one exit code and no traceback |
+| `certify`, `check`, ... | a module for each command |
 """
 
 import sys

@@ -178,21 +178,14 @@ def _write_log(error: BaseException) -> Path | None:
 
     from tubecert.release import __version__
 
-    text = "\n".join(
-        (
-            f"tubecert {__version__}, Python {platform.python_version()}, {platform.system()}",
-            f"arguments: {sys.argv[1:]}",
-            "".join(traceback.format_exception(error, limit=-60)),
-        )
-    )
-    name = f"{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.log"
+    head = f"tubecert {__version__}, Python {platform.python_version()}, {platform.system()}"
+    text = f"{head}\narguments: {sys.argv[1:]}\n{''.join(traceback.format_exception(error, limit=-60))}"
     home = os.environ.get("HOME")
-    state = os.environ.get("XDG_STATE_HOME") or (home and os.path.join(home, ".local", "state"))
-    folders = [Path(state) / "tubecert"] if state else []
-    for folder in (*folders, Path(tempfile.gettempdir())):
+    state = os.environ.get("XDG_STATE_HOME") or (home and f"{home}/.local/state")
+    for folder in (*([f"{state}/tubecert"] if state else []), tempfile.gettempdir()):
+        path = Path(folder) / f"tubecert-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.log"
         with contextlib.suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            path = folder / f"tubecert-{name}"
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8", errors="backslashreplace")
             return path
     return None

@@ -6,19 +6,20 @@ import ctypes
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from tubecert.controller.data import Data
+from tubecert.controller.data import Data, data_of
 from tubecert.controller.folder import files_of
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 from tubecert.printable import visible
+from tubecert.sampled_loop.record import Certificate
 
 COMPILERS: Final = ("cc", "gcc", "clang")
 FLAGS: Final = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
@@ -81,3 +82,18 @@ def _library(files: tuple[tuple[str, bytes], ...]) -> ctypes.CDLL:
 def _failed(message: str) -> TubecertError:
     help = "install gcc or clang: what is simulated is the controller in C, as it is exported"
     return TubecertError([Finding(code="TC711", message=message, help=help)])
+
+
+def stepper(certificate: Certificate) -> Callable[[int], Callable[..., Array]] | None:
+    """By the number of lanes, the exported code as a step of lanes that are last; None without code or compiler."""
+    try:
+        data = data_of(certificate)
+        Controller(data)
+    except TubecertError:
+        return None
+
+    def made(lanes: int) -> Callable[..., Array]:
+        code, handed = Controller(data, lanes), data.plan.at is None
+        return lambda y, x, u: code.step(y.T, *((x.T, u.T) if handed else ())).T
+
+    return made

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from tubecert.findings import Finding, Severity
 from tubecert.library.plain import Data
+from tubecert.library.shown import Shown
 from tubecert.library.specification import Specifiable, load
 from tubecert.report import findings as words
+from tubecert.report.page import Page
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
+class Checked(Shown):
     """What was found in a specification: `findings`, each with its code, severity, message, place and help."""
 
     name: str
@@ -26,10 +27,8 @@ class Checked:
     def __str__(self) -> str:
         return "\n".join(map(str, (*self.findings, words.summary(self.findings, 1))))
 
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-
-        return notebook.of_page(words.page_of(self.name, self.findings))
+    def _page(self) -> Page:
+        return words.page_of(self.name, self.findings)
 
 
 def check(source: Specifiable, *, settings: Data | None = None) -> Checked:
@@ -41,5 +40,4 @@ def check(source: Specifiable, *, settings: Data | None = None) -> Checked:
     from tubecert import pipeline
 
     found = load(source, settings=settings)
-    told: Sequence[Finding] = pipeline.inspect(found.spec)
-    return Checked(name=found.name, findings=tuple(told))
+    return Checked(name=found.name, findings=tuple(pipeline.inspect(found.spec)))

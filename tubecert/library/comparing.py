@@ -16,20 +16,22 @@ from tubecert.certificate.effective import Tree
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.certification import Certification
-from tubecert.library.reading import read
+from tubecert.library.reading import certificate_of
 from tubecert.library.sampled import SampledCertification
+from tubecert.library.shown import Shown
 from tubecert.library.specification import File
 from tubecert.printable import printable_json
 from tubecert.report import html, markdown
 from tubecert.report.comparison import Comparison as Sides
 from tubecert.report.comparison import page_of
+from tubecert.report.page import Page
 from tubecert.report.quantities import Value
 
 REMEDY: Final = "give a file FILE.html, FILE.md, FILE.csv or FILE.json in a folder that exists"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Comparison(Shown):
     """What certificates say, side by side; every sequence is in the order in which they were given.
 
     `quantities`: each number or word that one of them has, by its key (`rho`, `half_width.px`,
@@ -79,14 +81,8 @@ class Comparison:
         target = os.fspath(path)
         certificate.write_text(target, FORMATS[ending_of(target)](self), REMEDY)
 
-    def __str__(self) -> str:
-        page = page_of(self.sides)
-        return f"{page.name}: {page.summary}"
-
-    def _repr_html_(self) -> str:
-        from tubecert.report import notebook
-
-        return notebook.of_page(page_of(self.sides))
+    def _page(self) -> Page:
+        return page_of(self.sides)
 
 
 FORMATS: Final[Mapping[str, Callable[[Comparison], str]]] = {
@@ -111,15 +107,10 @@ def compare(
         refuse("certificates", str(len(certificates)), "two certificates or more are compared")
     if names is not None and len(names) != len(certificates):
         refuse("names", ", ".join(names), f"{len(names)} names for {len(certificates)} certificates")
-    read_ones = [read(each) if isinstance(each, (str, os.PathLike)) else each for each in certificates]
-    own = [
-        os.fspath(each) if isinstance(each, (str, os.PathLike)) else found.name
-        for each, found in zip(certificates, read_ones, strict=True)
-    ]
-    called = own if names is None else names
-    return Comparison(
-        sides=Sides.of([(name, each.certificate) for name, each in zip(called, read_ones, strict=True)])
-    )
+    found = [certificate_of(each) for each in certificates]
+    files = [os.fspath(each) if isinstance(each, (str, os.PathLike)) else each.name for each in certificates]
+    named = zip(names or files, found, strict=True)
+    return Comparison(sides=Sides.of([(name, each.certificate) for name, each in named]))
 
 
 def ending_of(target: str) -> str:

@@ -24,7 +24,7 @@ from tubecert.asking import (
     require_nothing_of_a_metric,
 )
 from tubecert.errors import SpecError, TubecertError
-from tubecert.findings import Finding, Severity
+from tubecert.findings import Finding
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
 from tubecert.library.certifying import SCHEDULER
 
@@ -35,11 +35,9 @@ if TYPE_CHECKING:
     from tubecert.library.simulation import SampledSimulation, Simulation
     from tubecert.library.specification import File, Specifiable
     from tubecert.progress import Progress
-    from tubecert.sampled_loop.record import Certificate as SampledCertificate
     from tubecert.simulation.adaptive.families import Drawing
     from tubecert.simulation.adaptive.loops import Controller
     from tubecert.simulation.adaptive.setting import Setting
-    from tubecert.simulation.sampled.loop import Controllers, Step
     from tubecert.spec import Spec
 
 EXTRA: Final = ("matplotlib",)
@@ -178,6 +176,7 @@ def _setting(
 ) -> tuple[Setting, Drawing | None]:
     """The setting; of a family that of the plan that is given, or of a random one, and what draws others."""
     from tubecert.model import build
+    from tubecert.pipeline.membership import member
     from tubecert.simulation.adaptive.families import drawing_of, members_of
     from tubecert.simulation.adaptive.setting import horizon_of, setting_of
     from tubecert.trajectory.make import plan_of
@@ -186,23 +185,11 @@ def _setting(
         return setting_of(system, result, duration), None
     model = build(system)
     if path is not None:
-        own = _member(system, os.fspath(path))
+        own = member(os.fspath(path), system)
         return setting_of(own, result, duration, plan_of(own, model)), None
     drawing = drawing_of(system, model, horizon_of(system, duration))
     ((plan, _),) = members_of(drawing, seed, [0])
     return setting_of(system, result, duration, plan), drawing
-
-
-def _member(system: Spec, path: str) -> Spec:
-    """The specification of a plan in a file that is proven to be one of the family; raises `SpecError` if not."""
-    from tubecert.pipeline.membership import member_spec, membership
-    from tubecert.printable import visible
-
-    own = member_spec(path, system)
-    missed = [item for item in membership(own, system, visible(path)) if item.severity is Severity.ERROR]
-    if missed:
-        raise SpecError(missed)
-    return own
 
 
 def _sampled(
@@ -216,6 +203,7 @@ def _sampled(
 ) -> SampledSimulation:
     """The same of a sampled loop."""
     from tubecert.certificate.belonging import as_set
+    from tubecert.controller.compiled import stepper
     from tubecert.library.sampled import compared
     from tubecert.library.simulation import SampledSimulation
     from tubecert.simulation.sampled.campaign import simulate as campaign
@@ -234,27 +222,9 @@ def _sampled(
     own = campaign(
         setting_of(system, result, duration),
         found.hash,
-        _compiled(found.certificate),
+        stepper(found.certificate),
         runs=_first(runs, default.runs, RUNS),
         seed=_first(seed, default.seed, 0),
         report=report,
     )
     return SampledSimulation(campaign=own)
-
-
-def _compiled(certificate: SampledCertificate) -> Controllers | None:
-    """The exported C code as the controller; None where there is none to export, or no compiler."""
-    from tubecert.controller.compiled import Controller
-    from tubecert.controller.data import data_of
-
-    try:
-        data = data_of(certificate)
-        Controller(data)
-    except TubecertError:
-        return None
-
-    def made(lanes: int) -> Step:
-        code, handed = Controller(data, lanes), data.plan.at is None
-        return lambda y, x, u: code.step(y.T, *((x.T, u.T) if handed else ())).T
-
-    return made

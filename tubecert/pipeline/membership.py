@@ -186,6 +186,15 @@ def _kept(found: Supremum, limit: Fraction) -> bool | None:
     return False if isfinite(found.below) and Fraction(found.below) > limit else None
 
 
+def member(path: str, family: Spec) -> Spec:
+    """The specification of a plan in a file that is proven to be one of the family; raises `SpecError` if not."""
+    own = member_spec(path, family)
+    findings = membership(own, family, visible(path))
+    if missed := [item for item in findings if item.severity is Severity.ERROR]:
+        raise SpecError(missed)
+    return own
+
+
 def member_spec(path: str, family: Spec) -> Spec:
     """The family's system with one plan; raises `SpecError` if the file has none that fits."""
     if Path(path).suffix.lower() == ".csv":
