@@ -225,6 +225,9 @@ def read_metric(field: Field, names: Names) -> Metric | Synthesis | None:
     """The dual metric with its rate, and declared bounds of the metric, or what is asked for in its place."""
     before = len(field.reader.findings)
     there = [key.text for key, _ in field.pairs() or ()] if isinstance(field.node, MappingNode) else []
+    if there == ["rate"]:
+        help = "add dual_metric: ..., or have one of this rate found: metric: {synthesise: {rate: ...}}"
+        return field.fail(codes.MISSING_KEY, f"{field.path} lacks dual_metric", f"{help} (tubecert synth)")
     if "synthesise" not in there:
         return None if len(field.reader.findings) > before else METRIC.read(field, names)
     entries = WANTED.entries(field, ("synthesise",)) or {}
