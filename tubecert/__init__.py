@@ -153,7 +153,7 @@ if not TYPE_CHECKING:  # a type checker knows what there is
         return value
 
     def __dir__():
-        return sorted({*globals(), *__all__})
+        return sorted(__all__)
 
 
 def _module(name: str) -> ModuleType:
