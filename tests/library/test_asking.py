@@ -84,3 +84,11 @@ def test_a_command_and_its_function_say_the_same(tmp_path):
     own = own.replace("gap:", "--gap:").replace("bandwidth", "--bandwidth")
     assert done.exit_code == 2
     assert done.stderr.removesuffix("3 errors\n").strip() == own.strip()
+
+
+@pytest.mark.parametrize("name", [*ASKED, "export", "compare"])
+def test_what_is_neither_a_value_nor_a_file_is_refused(name):
+    more = {"sweep": ({"tube.epsilon": [1]},), "export": ("folder",), "compare": (3,)}.get(name, ())
+    folder = {"folder": "folder"} if name == "sweep" else {}
+    with pytest.raises(tc.SpecError, match="is no text and no path"):
+        getattr(tc, name)(3, *more, **folder)

@@ -9,7 +9,7 @@ from typing import Any
 from tubecert.controller.data import data_of
 from tubecert.controller.folder import files_of, write
 from tubecert.controller.plans import refused
-from tubecert.library.reading import read
+from tubecert.library.reading import certificate_of
 from tubecert.library.sampled import SampledCertification
 from tubecert.library.specification import File
 from tubecert.library.stated import Stated
@@ -30,7 +30,7 @@ def export(result: Stated[Any] | File, folder: File) -> Exported:
     Raises `TubecertError` for a certificate that says less than `certified` or has no controller (TC710), and
     `TargetError` where a file of the folder is none that tubecert wrote, or was changed.
     """
-    found = result if isinstance(result, Stated) else read(result)
+    found = certificate_of(result)
     if not isinstance(found, SampledCertification):
         help = "give the specification a section hardware (rate, delay, noise), and certify again"
         raise refused("it is about a loop in continuous time, which no computer runs", help)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ def read(path: File) -> Certification | SampledCertification:
     from tubecert.certificate import file
     from tubecert.sampled_loop.record import FORMAT, of_json
 
-    source = text_of("path", path)
+    source = text_of("result", path)
     sealed = file.load(source, (file.FORMAT, FORMAT))
     if sealed["format"] == FORMAT:
         from tubecert.library.sampled import certification_of
@@ -33,5 +32,5 @@ def read(path: File) -> Certification | SampledCertification:
 
 
 def certificate_of(result: Any) -> Any:
-    """A certificate that is given as a value, or as its file."""
-    return read(result) if isinstance(result, (str, os.PathLike)) else result
+    """A certificate that is given as a value, or as its file; raises `SpecError` for what is neither."""
+    return result if hasattr(result, "certificate") else read(result)

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tubecert.asking import Exact, Number, Source, Text, asker, named, question
+from tubecert.asking import Exact, Number, Source, Text, asker, named, question, text_of
 from tubecert.errors import ExitCode
 from tubecert.library.shown import Shown
 
@@ -81,11 +81,11 @@ def recheck(
     from tubecert.recheck.run import recheck as examined
     from tubecert.report.progress import timed
 
-    if isinstance(result, (str, os.PathLike)):
-        name = os.fspath(result)
-        text = _text_of(name)
+    if isinstance(text := getattr(result, "text", None), str):
+        name = str(getattr(result, "name", ""))
     else:
-        text, name = result.text, result.name
+        name = text_of("result", result)
+        text = _text_of(name)
     note = "" if spec is None else _specified(text, name, spec)
     shown = timed(progress)
     found = examined(
