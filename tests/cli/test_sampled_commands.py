@@ -129,6 +129,11 @@ def test_report_compare_and_recheck_know_it():
 
 
 @pytest.mark.slow
+def test_a_sampled_loop_has_a_deadline_as_a_command_has():
+    assert run("certify", "cart.yaml", "--deadline", "100").exit_code == 0
+
+
+@pytest.mark.slow
 def test_a_certificate_of_another_file_is_told():
     from tubecert.library.rechecking import _specified
 

@@ -58,6 +58,8 @@ def certify(
     spare(target, inputs)
     check_pages(report, {**inputs, "certificate": None if target == certificate.STDOUT else target})
     system = load(spec, set_)
+    if system.hardware is not None:
+        asked.pop("deadline", None)  # the command is ended then, whatever it does
     kept = _kept_place(spec, system, target, synthesised=metric is None)
     if kept is not None:
         telling.warn_of_size(system, how)
