@@ -16,8 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from flint import ctx
 
-from tubecert.recheck.claims import Case
 from tubecert.recheck.certificate import read_certificate
+from tubecert.recheck.claims import Case
 from tubecert.recheck.constants import OVER_TUBE, bounded
 from tubecert.recheck.document import read
 
