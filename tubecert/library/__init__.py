@@ -5,13 +5,10 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 
 | module | what it does |
 |---|---|
-| `numbers`, `asked` | what is asked for beside a specification: exact numbers, words that go together |
+| `certifying`, `metrics`, `simulating`, `sweeping`, `rechecking` | functions named as commands; their words are options |
+| `pages`, `comparing`, `exporting`, `checks` | the same |
+| `certification`, `sampled`, `stated`, `simulation`, `reading`, `shown` | what they give, as values |
 | `plain`, `specification` | values of Python as a specification |
-| `certification`, `certifying` | a certificate as a value; how one is made |
-| `metrics` | metrics found, or decided |
 | `workers` | who helps: processes, or a cluster |
-| `simulating`, `simulation`, `rechecking`, `pages` | what can be done with a certificate |
-| `comparing` | certificates side by side |
-| `sweeping` | many values of some keys |
 | `figures` | the tube and the trade-off, drawn into axes |
 """
