@@ -5,7 +5,7 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 
 | module | what it does |
 |---|---|
-| `certifying`, `metrics`, `simulating`, `sweeping`, `rechecking` | functions named as commands; their words are options |
+| `certifying`, `metrics`, `simulating`, `sweeping`, `rechecking` | functions with the names of commands |
 | `pages`, `comparing`, `exporting`, `checks` | the same |
 | `certification`, `sampled`, `stated`, `simulation`, `reading`, `shown` | what they give, as values |
 | `plain`, `specification` | values of Python as a specification |
