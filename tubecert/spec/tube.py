@@ -187,8 +187,8 @@ CONDITIONS: Final = Section(
     keys={
         "decides": entry(
             word(*_LETTERS, also=(26, 0), means=_LETTERS),
-            words="The certificate that decides the verdict: 0 (none: without adaptation), A (the paper's), B (distance), "
-            "or all of A and B; A if it is not said. The option --conditions overrides it.",
+            words="The certificate that decides the verdict: 0 (none: without adaptation), A (the paper's), "
+            "B (distance), or all of A and B; A if it is not said. The option --conditions overrides it.",
         )
     },
 )
