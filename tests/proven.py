@@ -6,7 +6,6 @@ Not for tests that put something broken in the producer's place: what it makes w
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -54,12 +53,12 @@ def _made(text: str, options: pipeline.Options, bare: bool) -> tuple[Result, str
 @contextmanager
 def barely() -> Iterator[None]:
     """What is certified meanwhile is what decides: no curves, no gains beside it, nothing is explained."""
-    asked = certification._asked
+    asked = pipeline.Options.asked
 
     def unexplained(proposer: Proposer) -> Explained:
         return Explained(slopes=None if proposer.slopes is None else {})
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(certification, "_asked", lambda question: replace(asked(question), curve=False))
+        patch.setattr(pipeline.Options, "asked", lambda self, *, curve: asked(self, curve=False))
         patch.setattr(certification, "_explained", lambda judged, key, proposer: unexplained(proposer))
         yield

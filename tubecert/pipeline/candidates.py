@@ -6,17 +6,14 @@ fails. What only explains or describes a certificate is left out; what is certif
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, isfinite, sqrt
-from typing import Any
 
 from tubecert.claims.advice import MendPlan
-from tubecert.claims.family import Claim
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.theorem import Asked
 from tubecert.kernel import overall
 from tubecert.kinds import ALONE, DISTANCE
-from tubecert.kinds.kind import Pair, Section, SectionData
+from tubecert.kinds.kind import Pair, SectionData
 from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import defect_share, mending, plan, tube
 from tubecert.pipeline.reasons import reasons
@@ -31,48 +28,33 @@ from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ending:
-    """How a certification ends: with the constants of the tube and the sections of kinds, or at a claim that fails."""
-
-    enclosed: Enclosed | None = None
-    sections: tuple[Section[Any], ...] = ()
-    claim: Claim | None = None
-    verdict: Verdict
-
-
-def ending(question: Question, metric: VerifiedMetric) -> Ending:
-    """The end of the question, whose metric is the one given."""
-    proven = _proven(question, metric)
-    if isinstance(proven, Stopped):
-        return _stopped(proven)
-    found = tube(plan(proven))
-    if isinstance(found, Stopped):
-        return _stopped(found)
-    enclosed = enclose(found)
-    if (broken := unmet(enclosed)) is not None:
-        return _stopped(broken)
-    return _judged(question, enclosed)
-
-
 def judged_row(row: Row, question: Question, outputs: Measure | None = None) -> Row:
     """The row with what its metric comes to, by the width of the tube in `outputs` where those count."""
-    end = ending(question, row.metric)
-    row = replace(row, verdict=end.verdict, claim=end.claim)
-    if end.enclosed is None:
-        return row
-    problem, by_key = end.enclosed.problem, {section.name.key: section for section in end.sections}
+    end = _enclosed(question, row.metric)
+    if isinstance(end, Stopped):
+        return replace(row, verdict=end.reason.verdict, claim=end.reason.claim)
+    problem, asked, keys = end.problem, question.options.asked(curve=False), deciding(question)
+    sections = {
+        key: kind_of(key).section(problem, PROPOSERS[kind_of(key).theorem.recipe].propose(problem, asked))
+        for key in dict.fromkeys([*keys, DISTANCE.key, ALONE.key])
+    }
+    verdict = overall([sections[key].verdict for key in keys])
+    short = next((s for key in keys if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
-    distance = by_key[DISTANCE.key]
+    distance = sections[DISTANCE.key]
     least = distance.at(LEAST)
-    decisive = next((found for section in end.sections if (found := _pair(question, section.data()))), None)
+    decisive = next(
+        (found for section in sections.values() if (found := _pair(question, section.data()))), None
+    )
     return replace(
         row,
-        alone=by_key[ALONE.key].verdict is Verdict.CERTIFIED,
-        mend=_mend(end.enclosed) if end.verdict is not Verdict.CERTIFIED else None,
+        verdict=verdict,
+        claim=None if short is None else reasons(short, Explained())[0].claim,
+        alone=sections[ALONE.key].verdict is Verdict.CERTIFIED,
+        mend=_mend(end) if verdict is not Verdict.CERTIFIED else None,
         input_gain=gain / sqrt(lower) if isfinite(gain) else None,
         rho=float(problem.rho),
-        width=None if outputs is None else outputs.of(half_widths(end.enclosed)),
+        width=None if outputs is None else outputs.of(half_widths(end)),
         ultimate_radius=distance.ultimate_radius,
         adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
         bandwidth=None if decisive is None or decisive.bandwidth is None else float(decisive.bandwidth),
@@ -86,31 +68,20 @@ def _mend(enclosed: Enclosed) -> MendPlan | None:
     return None if allowed or defect_share(enclosed.problem) < 1 else mending(enclosed)
 
 
+def _enclosed(question: Question, metric: VerifiedMetric) -> Enclosed | Stopped:
+    """The constants over the tube of the metric, or the claim that fails before."""
+    proven = _proven(question, metric)
+    found = proven if isinstance(proven, Stopped) else tube(plan(proven))
+    enclosed = found if isinstance(found, Stopped) else enclose(found)
+    return enclosed if isinstance(enclosed, Stopped) else unmet(enclosed) or enclosed
+
+
 def _proven(question: Question, metric: VerifiedMetric) -> ProvenMetric | Stopped:
     """The proof that the ladder made, where the text of the metric reads back as the same expressions."""
     proof = metric.proof
     if proof.lower_on_set is None or not proof.is_about(question.model, question.spec.safe_set):
         return prove_metric(question)
     return ProvenMetric(question=question, proof=proof, lower=proof.lower_on_set)
-
-
-def _stopped(end: Stopped) -> Ending:
-    return Ending(claim=end.reason.claim, verdict=end.reason.verdict)
-
-
-def _judged(question: Question, enclosed: Enclosed) -> Ending:
-    options = question.options
-    asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate, curve=False)
-    keys = deciding(question)
-    problem = enclosed.problem
-    sections = {
-        key: kind_of(key).section(problem, PROPOSERS[kind_of(key).theorem.recipe].propose(problem, asked))
-        for key in dict.fromkeys([*keys, DISTANCE.key, ALONE.key])
-    }
-    verdict = overall([sections[key].verdict for key in keys])
-    short = next((s for key in keys if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)
-    claim = None if short is None else reasons(short, Explained())[0].claim
-    return Ending(enclosed=enclosed, sections=tuple(sections.values()), claim=claim, verdict=verdict)
 
 
 def _pair(question: Question, section: SectionData) -> Pair | None:

@@ -14,7 +14,6 @@ from tubecert.certificate.result import Result
 from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Reason
 from tubecert.conditions.problem import TubeProblem
-from tubecert.conditions.theorem import Asked
 from tubecert.kinds.table import KINDS, kind_of
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed
@@ -96,7 +95,8 @@ def tube(planned: Planned) -> TubeFound | Stopped:
 
 def judge(bounded: Bounded) -> Judged:
     """The verdict on what every search proposes."""
-    problem, asked, question = bounded.problem, _asked(bounded.question), bounded.question
+    problem, question = bounded.problem, bounded.question
+    asked = question.options.asked(curve=not question.brief)
     only = [kind_of(key).theorem.recipe for key in deciding(question)] if question.brief else PROPOSERS
     proposals = {}
     for recipe, each in PROPOSERS.items():
@@ -133,13 +133,6 @@ def _explained(judged: Judged, key: str, proposer: Proposer) -> Explained:
         return None if found is None else found.recipe
 
     return proposer.explain(judged.bounded.problem, at)
-
-
-def _asked(question: Question) -> Asked:
-    options = question.options
-    return Asked(
-        bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate, curve=not question.brief
-    )
 
 
 def _advised(judged: Judged, told: list[Reason]) -> list[Reason]:

@@ -193,8 +193,7 @@ def _lowered(problem: TubeProblem, least: Mapping[str, float]) -> TubeProblem:
 
 def _sizes(problem: TubeProblem, question: Question) -> tuple[float, ...]:
     """What is to be small, of each kind that decides: gains, or the distance that is reached."""
-    options = question.options
-    asked = Asked(bandwidth=options.bandwidth, adaptation_rate=options.adaptation_rate, curve=False)
+    asked = question.options.asked(curve=False)
     return tuple(size for key in deciding(question) for size in _sizes_of(problem, key, asked))
 
 

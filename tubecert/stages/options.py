@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
+from tubecert.conditions.theorem import Asked
 from tubecert.spec import Spec
 
 
@@ -26,6 +27,10 @@ class Options:
     gap: Fraction = Fraction(1, 100)
     by_effect: bool | None = None
     budget: int = 2_000_000
+
+    def asked(self, *, curve: bool) -> Asked:
+        """The gains that are asked for; with `curve`, what else is possible beside them."""
+        return Asked(bandwidth=self.bandwidth, adaptation_rate=self.adaptation_rate, curve=curve)
 
 
 def overridden(spec: Spec, options: Options) -> Spec:
