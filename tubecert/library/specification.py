@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from tubecert.asking import asker, named, text_of
-from tubecert.certificate.effective import Effective
+from tubecert.certificate.effective import Effective, as_file
 from tubecert.certificate.file import digest
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, NamedPlace
@@ -58,12 +58,12 @@ class Specification:
     @property
     def data(self) -> dict[str, Plain]:
         """The effective specification in texts, lists and mappings, defaults written out; itself a specification."""
-        return canonical(self.spec)
+        return as_file(canonical(self.spec))
 
     @property
     def hash(self) -> str:
-        """The hash of `data`: the same for the same system, however it is written."""
-        return digest(self.data)
+        """The hash of its canonical form: the same for the same system, however it is written."""
+        return digest(canonical(self.spec))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Specification) and self.data == other.data
