@@ -9,7 +9,6 @@ from typing import ClassVar
 from tubecert.claims.family import Claim, Reason, Said, plain
 from tubecert.digits import near
 from tubecert.records import Tagged
-from tubecert.spec.codes import title
 from tubecert.verdict import Verdict
 
 
@@ -135,6 +134,8 @@ class NotWritable(Failure):
     code: str
 
     def _told(self, reason: Reason) -> str:
+        from tubecert.spec.codes import title  # with YAML, which a page of words does without
+
         return f"the metric cannot be written: {title(self.code)}"
 
 
