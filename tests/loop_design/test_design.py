@@ -8,7 +8,8 @@ import pytest
 from plants import double, plant, pvtol, scalar
 
 from tubecert.loop_design.certification import certify
-from tubecert.loop_design.design import design
+from tubecert.loop_design.design import _Search, design
+from tubecert.loop_design.observer import in_units, observe, units_of
 from tubecert.loop_design.unfound import NoDesign
 from tubecert.spec import load, load_text
 from tubecert.spec.override import Setting
@@ -133,6 +134,14 @@ hardware: {rate: 200, delay: 0.002, noise: {q: 0.001, w: 0.01}}
 limits: {u: [-20, 20]}
 """
     assert certify(load_text(text + wind, "pendulum.yaml")).result.verdict == "certified"
+
+
+@pytest.mark.parametrize(("bent", "meets"), [(100.0, False), (0.0, True)])
+def test_a_tube_that_is_wider_than_the_safe_set_meets_no_wish(bent, meets):
+    """Without wishes as well: the search starts again then, which a drone of a mass known to 5 % needs."""
+    machine = double(rho=lambda W, U: np.array([0.0, bent * W[0], 0.0]), space=100.0)
+    search = _Search(observe(in_units(machine, units_of(machine))), lambda *_: None)
+    assert search.meets_wishes(search.within()) == meets
 
 
 @pytest.mark.slow

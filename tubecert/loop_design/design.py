@@ -168,9 +168,11 @@ class _Search:
         return bool(wished.any() or grows)
 
     def meets_wishes(self, weights: Array) -> bool:
-        """Whether the tube of these weights is as narrow as wished."""
+        """Whether the tube of these weights is as narrow as wished, and not wider than the safe set."""
         reached = self._reach(weights, STEPS)
-        return reached is not None and bool((reached[1] <= self.plant.wishes).all())
+        return reached is not None and bool(
+            (reached[1] <= np.minimum(self.plant.wishes, self.plant.space)).all()
+        )
 
     def narrowed(self, weights: Array) -> Array:
         """From weights that meet the wishes on to narrower tubes that meet them as well."""
