@@ -175,7 +175,9 @@ def killer(side, package, tests, good, bad):
     for name in [
         own
         for own in sys.modules
-        if own.startswith((package, "tubecert.loop_design", "tubecert.recheck.run", "sampled_files", "test_"))
+        if own.startswith(
+            (package, "tubecert.loop_design", "tubecert.recheck.run", "sampled_files", "small_loops", "test_")
+        )
     ]:
         del sys.modules[name]
     with open(os.devnull, "w") as nothing:

@@ -6,40 +6,13 @@ from functools import cache
 
 import numpy as np
 from rechecked import digest, failing
+from small_loops import SCALAR, result_of
 
-from tubecert.certificate.effective import Effective
 from tubecert.errors import TubecertError
-from tubecert.loop_design.proposal import propose
-from tubecert.model import build
 from tubecert.recheck.run import Recheck, recheck
-from tubecert.sampled_loop.record import (
-    Claim,
-    Nominal,
-    Notes,
-    Result,
-    Source,
-    Tables,
-    certificate_text,
-    seal,
-)
-from tubecert.sampled_loop.remainders import Remainders
-from tubecert.sampled_loop.setting import Loop
-from tubecert.sampled_loop.theorem import check
+from tubecert.sampled_loop.record import Notes, Tables, certificate_text, seal
 from tubecert.spec import load_text
-from tubecert.spec.canonical import canonical
-from tubecert.trajectory.make import plan_of
 
-SCALAR = """
-tubecert: 1
-name: scalar
-system: {states: [x], inputs: [u], f: ["0.5*x"], B: [[1]]}
-safe_set: {x: [-5, 5]}
-trajectory: {kind: equilibrium, at: [0], input: [0]}
-initial_state: {at: [0.3]}
-hardware: {sample_time: 0.1, delay: 0.04, noise: {x: 0.01}}
-disturbance: {E: [[1]], bound: [0.2]}
-limits: {u: [-3, 3]}
-"""
 CART = """
 tubecert: 1
 name: cart
@@ -117,28 +90,8 @@ def tables(N, F=(), G=(), M=()) -> Tables:
 
 @cache
 def _proven(text: str, gain: tuple, slow: bool) -> str:
-    spec = load_text(text)
-    model, own = build(spec), tables(*gain)
-    n, m = len(spec.states), len(spec.inputs)
-    A, B, E = (np.array(value, dtype=float) for value in MATRICES[spec.name])
-    matrices = {"A": A.reshape(n, n), "B": B.reshape(n, m), "E": E.reshape(n, -1)}
-    loop = Loop(spec=spec, model=model, plan=plan_of(spec, model), knots=None, slow=slow, **matrices)
-    inequalities, stages = propose(Remainders(loop, 64), own)
-    found = check(loop, inequalities.controller, stages, inequalities.recipe)
-    data = canonical(spec)
-    result = Result(
-        verdict=found.verdict,
-        spec=Source(effective=Effective.of(data), effective_hash=digest(data), file_hash="sha256:0"),
-        claim=Claim(horizon=loop.horizon, afterwards=loop.afterwards, hold=loop.hold),
-        nominal=Nominal(**matrices),
-        controller=own,
-        tube=stages,
-        inputs=found.inputs,
-        clearance=found.clearance,
-        recipe=inequalities.recipe,
-        lacks=found.lacks,
-    )
-    return certificate_text(seal(result, Notes(), {}))
+    name = load_text(text).name
+    return certificate_text(seal(result_of(text, *MATRICES[name], tables(*gain), slow=slow), Notes(), {}))
 
 
 MATRICES = {
