@@ -7,19 +7,17 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pytest
 from shared import once
+from texts import CONFIGS
 
 from tubecert import certificate, pipeline
 from tubecert.certificate.result import Result
 from tubecert.pipeline import certification
 from tubecert.search.proposers import Explained, Proposer
 from tubecert.spec import load_text
-
-CONFIGS = Path(__file__).parents[1] / "configs"
 
 
 def proven(text: str, *, bare: bool = False, **options: Any) -> Any:

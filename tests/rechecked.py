@@ -4,7 +4,6 @@ import hashlib
 import json
 import pickle
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import proven
@@ -18,7 +17,6 @@ from tubecert.recheck.grammar import read
 from tubecert.recheck.run import Recheck, recheck
 from tubecert.recheck.terms import Term, variable
 
-CONFIGS = Path(__file__).parents[1] / "configs"
 Document = dict[str, Any]
 
 

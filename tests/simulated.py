@@ -2,12 +2,12 @@
 
 from fractions import Fraction
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from proven import barely
 from shared import once
+from texts import CONFIGS
 
 from tubecert import pipeline
 from tubecert.certificate.result import Result
@@ -17,8 +17,6 @@ from tubecert.simulation.adaptive.reading import adopted
 from tubecert.simulation.adaptive.setting import Setting, setting_of
 from tubecert.simulation.lanes import Found
 from tubecert.spec import Spec, load, load_text
-
-CONFIGS = Path(__file__).parent.parent / "configs"
 
 FLAT = """
 tubecert: 1

@@ -187,6 +187,19 @@ metric: {rate: 0.5, dual_metric: [[1]]}
 tube: {epsilon: 0.5, rho_a: 0.5}
 """
 
+# one with a parameter, adapted to
+ONE = """tubecert: 1
+name: one
+system: {states: [x], inputs: [u], parameters: {k: 1}, f: [-k*x], B: [[1]]}
+safe_set: {x: [-1, 1]}
+uncertainty: {h: [0.1*sin(t)]}
+trajectory: {kind: equilibrium, at: [0], horizon: 10}
+initial_state: {at: [0.05]}
+metric: {rate: 0.5, dual_metric: [[1]]}
+tube: {epsilon: 0.2, rho_a: 0.1}
+adaptation: {A_m: -1}
+"""
+
 # any plan of the two-state system in a box
 FAMILY_TWO = """
 tubecert: 1

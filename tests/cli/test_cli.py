@@ -8,6 +8,7 @@ from pathlib import Path
 import certificates
 import pytest
 from commands import run
+from texts import ROOT
 
 from tubecert import __version__, pipeline
 from tubecert.certificate import digest
@@ -18,7 +19,6 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.spec import canonical
 
-ROOT = Path(__file__).parents[2]
 SPEC = ROOT / "configs" / "three_state.yaml"
 TEXT = SPEC.read_text(encoding="utf-8")
 LOCATED = re.compile(r"^(\S+:\d+:\d+|--[a-z-]+): error TC\d{3}: ", re.MULTILINE)

@@ -4,16 +4,14 @@ import importlib.util
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
+from commands import run
 from systems import SMALL
-from typer.testing import CliRunner
+from texts import ROOT
 
-from tubecert.cli.app import app
 from tubecert.library.simulating import EXTRA
 
-ROOT = Path(__file__).parents[2]
 ORBIT = ROOT / "configs" / "two_state_orbit.yaml"
 WITHOUT = f"import sys\nfor name in {EXTRA}: sys.modules[name] = None\nfrom tubecert.cli import main\nmain()"
 
@@ -29,7 +27,7 @@ def test_without_it_simulate_says_how_to_install_it(monkeypatch, tmp_path):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name, *rest: None if name in EXTRA else honest(name, *rest)
     )
-    done = CliRunner().invoke(app, ["simulate", str(ORBIT), "-o", str(tmp_path / "out")])
+    done = run("simulate", ORBIT, "-o", tmp_path / "out")
     assert done.exit_code == 2
     assert "error TC122: simulate needs matplotlib" in done.stderr
     assert "pip install 'tubecert[simulate]'" in done.stderr

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from texts import ROOT
 
-ROOT = Path(__file__).parents[2]
 SPEC = str(ROOT / "configs" / "three_state.yaml")
 
 pytestmark = [

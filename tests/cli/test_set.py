@@ -2,12 +2,12 @@
 
 import copy
 import json
-from pathlib import Path
 
 import proven
 import pytest
 from commands import run
 from systems import SMALL
+from texts import ROOT
 
 from tubecert.certificate import dump, seal
 from tubecert.certificate.result import Result
@@ -20,7 +20,6 @@ from tubecert.spec.override import Setting, put
 from tubecert.spec.source import Source
 
 pytestmark = pytest.mark.timeout(120)
-ROOT = Path(__file__).parents[2]
 SPEC = ROOT / "configs" / "three_state.yaml"
 SETTINGS = ("--set", "tube.rho_a=1/100", "--set", "metric.rate=.99", "--set", "initial_state.at[0]=0.009")
 

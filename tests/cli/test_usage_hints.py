@@ -4,12 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
+from commands import run
 from mistakes import GOOD
-from typer.testing import CliRunner
 
-from tubecert.cli.app import app, start
-
-ROOT = Path(__file__).parents[2]
+from tubecert.cli.app import start
 
 
 def said(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *words: str) -> str:
@@ -66,7 +64,7 @@ def test_a_file_that_is_another_one(
 
 
 def test_a_session_is_told_in_its_order() -> None:
-    said = CliRunner().invoke(app, ["--help"]).stdout
+    said = run("--help").stdout
     order = [
         said.index(f"  tubecert {word} robot.") for word in ("init", "check", "synth", "certify", "report")
     ]
@@ -85,7 +83,7 @@ def test_nothing_is_guessed_of_an_option_of_one_letter(
 def test_another_file_of_ours_is_named(tmp_path: Path, form: str, what: str) -> None:
     path = tmp_path / "file.json"
     path.write_text(json.dumps({"format": form, "result": {}}, indent=1))
-    result = CliRunner().invoke(app, ["certify", str(path)])
+    result = run("certify", path)
     assert result.exit_code == 2
     assert f"this is {what}, not a specification" in result.stderr
     assert result.stderr.count("error TC") == 1

@@ -2,9 +2,9 @@
 
 from fractions import Fraction
 from math import cos, sin
-from pathlib import Path
 
 import pytest
+from texts import CONFIGS, replaced
 
 from tubecert.claims.statements import MetricKilling
 from tubecert.enclosure.branch_and_bound import Effort, supremum
@@ -15,15 +15,11 @@ from tubecert.model import build
 from tubecert.pipeline import Options, certify
 from tubecert.spec import load_text
 
-TEXT = (Path(__file__).parents[2] / "configs" / "state_dependent_input.yaml").read_text(encoding="utf-8")
+TEXT = (CONFIGS / "state_dependent_input.yaml").read_text(encoding="utf-8")
 
 
 def spec(*changes):
-    text = TEXT
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    return load_text(text, "spec.yaml")
+    return load_text(replaced(TEXT, *changes), "spec.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -87,14 +83,17 @@ def test_too_high_a_rate_is_refuted():
     assert 1.76 < below <= above < 1.77
 
 
-def test_finslers_lemma_agrees_with_the_moving_annihilator():
-    chosen = spec()
-    model = build(chosen)
+def largest(chosen, model, absolute):
+    """The supremum of the projected pencil on the whole set."""
     domain = BoxDomain(dict(zip(chosen.states, chosen.safe_set, strict=True)))
     objective = ProjectedPencil(
         model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
     )
-    found = supremum(objective, domain, Effort(gap=0.0, absolute=1e-3))
+    return supremum(objective, domain, Effort(gap=0.0, absolute=absolute))
+
+
+def test_finslers_lemma_agrees_with_the_moving_annihilator():
+    found = largest(spec(), build(spec()), 1e-3)
     exact = -2 * (1 + 0.5 * (2 - sin(0.5)))
     assert found.below <= exact * (1 - 1e-12)
     assert exact <= found.above
@@ -118,11 +117,7 @@ tube: {epsilon: 0.1, rho_a: 0.1}
 """
     chosen = load_text(text, "spec.yaml")
     model = build(chosen)
-    domain = BoxDomain(dict(zip(chosen.states, chosen.safe_set, strict=True)))
-    objective = ProjectedPencil(
-        model.drift_form, model.W, model.BBt, model.projector, inputs=len(model.inputs)
-    )
-    found = supremum(objective, domain, Effort(gap=0.0, absolute=1e-2))
+    found = largest(chosen, model, 1e-2)
     assert found.below <= -4 <= found.above
     assert found.above <= -4 + 2e-2
     # W does not follow B, so C3 fails: the metric is refused, whatever C2 says

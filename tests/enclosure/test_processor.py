@@ -8,10 +8,9 @@ import sys
 from contextlib import contextmanager
 
 import pytest
+from commands import run
 from problems import judged_26, two_state
-from typer.testing import CliRunner
 
-from tubecert.cli.app import app
 from tubecert.enclosure.processor import require_ieee
 from tubecert.errors import ProcessorError
 
@@ -71,7 +70,7 @@ def test_no_proof_is_made_then(monkeypatch):
 def test_no_constant_is_bounded_then_and_the_command_says_why(monkeypatch, tmp_path):
     monkeypatch.setattr("tubecert.enclosure.branch_and_bound.require_ieee", strange)
     (tmp_path / "plant.yaml").write_text(SPEC)
-    told = CliRunner().invoke(app, ["certify", str(tmp_path / "plant.yaml"), "-o", str(tmp_path / "c.json")])
+    told = run("certify", tmp_path / "plant.yaml", "-o", tmp_path / "c.json")
     assert told.exit_code == 3
     assert "does not round as IEEE 754 does" in told.stderr
     assert "defect" not in told.stderr

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.text import Text
 from systems import SMALL
+from texts import ROOT
 
 from tubecert.certificate import dump, seal
 from tubecert.certificate.result import Certificate
@@ -31,7 +32,6 @@ from tubecert.report.certificate_page import page_of
 from tubecert.report.page import typeset
 from tubecert.report.terminal import Terminal
 
-ROOT = Path(__file__).parents[2]
 NASTY = st.text(
     st.characters(exclude_categories=["Cs"])
     | st.sampled_from("\x1b\x07\r\n\x9b\u202e\u2028\x00:#[]|`*\udcff"),

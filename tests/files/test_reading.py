@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 from commands import run
+from texts import ROOT
 
 from tubecert import files, kept, spec
 from tubecert.errors import TargetError, TubecertError
 from tubecert.findings import MOST, Finding, Location, Severity, capped
 
-ROOT = Path(__file__).parents[2]
 KIND = files.Kind(most=100, unreadable="TC100", too_large="TC102", help="give another")
 PLAN = """
 tubecert: 1

@@ -14,18 +14,17 @@ import numpy as np
 import pytest
 import sympy
 import yaml
+from commands import run
 from hypothesis import given
 from hypothesis import strategies as st
 from systems import SCALAR
-from typer.testing import CliRunner
+from texts import ROOT
 
 import tubecert as tc
 from tubecert import asking
-from tubecert.cli.app import app
 from tubecert.letters import NAMES
 from tubecert.pipeline.counting import claims_of
 
-ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 TEXT = """
 tubecert: 1
@@ -231,7 +230,7 @@ def test_certify_says_what_the_command_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("cart.yaml").write_text(TEXT, encoding="utf-8")
     options = ["--rho-a", "0.3", "--conditions", "B", "--gap", "0.02", "-o", "command.json"]
-    assert CliRunner().invoke(app, ["certify", "cart.yaml", *options]).exit_code == 0
+    assert run("certify", "cart.yaml", *options).exit_code == 0
     result = tc.certify("cart.yaml", rho_a=0.3, conditions="B", gap=Fraction(1, 50))
     result.save("library.json")
     command, library = (Path(name).read_text("utf-8") for name in ("command.json", "library.json"))
@@ -425,7 +424,7 @@ def test_a_page_is_that_of_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     certified().save("x.json")
     page = tc.report("x.json")
-    assert CliRunner().invoke(app, ["report", "x.json", "-o", "x.html", "-o", "x.md"]).exit_code == 0
+    assert run("report", "x.json", "-o", "x.html", "-o", "x.md").exit_code == 0
     assert page.html == tc.report(certified()).html == Path("x.html").read_text("utf-8")
     assert page.markdown == Path("x.md").read_text("utf-8")
     page.save("y.md")

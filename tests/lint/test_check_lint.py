@@ -6,6 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from texts import replaced
 
 import tubecert
 from tubecert import lint, pipeline
@@ -101,11 +102,7 @@ def found(text: str) -> list[Finding]:
 
 
 def changed(*changes: tuple[str, str]) -> str:
-    text = BASE
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return text
+    return replaced(BASE, *changes)
 
 
 def test_nothing_is_said_of_the_base():

@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from problems import W_CONSTANT, W_LINEAR, W_SQUARE
 from systems import plain_model
+from texts import CONFIGS
 
 from tubecert.coordinates import Fields
 from tubecert.enclosure.branch_and_bound import Effort
@@ -19,7 +19,6 @@ from tubecert.spec import load_text
 from tubecert.trajectory import constant_plan
 from tubecert.tube import Tube
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 THREE = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8")
 ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text(encoding="utf-8")
 X, Y, Z = symbol("x"), symbol("y"), symbol("z")

@@ -3,11 +3,11 @@
 import dataclasses
 import math
 from fractions import Fraction
-from pathlib import Path
 
 import proven
 import pytest
 from problems import judged_26, judged_distance, problem_of
+from texts import CONFIGS, replaced
 
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate import seal
@@ -18,7 +18,6 @@ from tubecert.records import from_json
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 THREE = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8")
 ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text(encoding="utf-8")
 
@@ -27,13 +26,6 @@ PRINTED_THREE = """  dual_metric:
     - ["-0.41*x1", "0.81*x1**2 + 0.22", "0.01*x1 - 0.01"]
     - ["-0.01", "0.01*x1 - 0.01", "0.07*x1 + 0.22"]
 """
-
-
-def edited(text, *changes):
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    return text
 
 
 def with_metric(text, metric, following="tube:"):
@@ -52,7 +44,7 @@ def captured_problem(text, **options):
 
 
 def declared(text):
-    return edited(text, ("  rate: 0.9999", "  bounds: {lower: 3.85, upper: 5.88}\n  rate: 0.9999"))
+    return replaced(text, ("  rate: 0.9999", "  bounds: {lower: 3.85, upper: 5.88}\n  rate: 0.9999"))
 
 
 @pytest.fixture(scope="module")
@@ -102,10 +94,12 @@ def test_gains_of_the_reference_rows():
 @pytest.mark.parametrize(
     ("text", "largest"),
     [
-        (edited(with_metric(THREE, PRINTED_THREE), ("rate: 0.9999", "rate: 1")), "0.99653"),
-        (edited(THREE, ("rate: 0.9999", "rate: 1")), "0.99999"),
+        (replaced(with_metric(THREE, PRINTED_THREE), ("rate: 0.9999", "rate: 1")), "0.99653"),
+        (replaced(THREE, ("rate: 0.9999", "rate: 1")), "0.99999"),
         (
-            edited(ORBIT, ('"4.25828", "-0.93423"', "4.26, -0.93"), ('"-0.93423", "3.76692"', "-0.93, 3.77")),
+            replaced(
+                ORBIT, ('"4.25828", "-0.93423"', "4.26, -0.93"), ('"-0.93423", "3.76692"', "-0.93, 3.77")
+            ),
             "1.73933",
         ),
     ],
@@ -146,7 +140,7 @@ def assert_same_gains(one, other):
 
 @pytest.mark.slow
 def test_a_smaller_tube_never_has_larger_constants(three):
-    smaller = run(edited(THREE, ("epsilon: 0.01, rho_a: 0.01", "epsilon: 0.005, rho_a: 0.005")))
+    smaller = run(replaced(THREE, ("epsilon: 0.01, rho_a: 0.01", "epsilon: 0.005, rho_a: 0.005")))
     derived = {"theta", "prediction_error", "filter_error", "zeta_1", "zeta_2", "zeta_3", "Psi_rate", "speed"}
     for name, constant in smaller["constants"].items():
         if name in derived | {"lower", "input_gain_least"}:
@@ -185,19 +179,19 @@ def test_a_moving_plan_is_certified_and_its_defect_proven_zero():
 @pytest.mark.slow
 def test_a_wrong_plan_has_its_defect_measured_and_costs_gain_or_the_certificate():
     exact = run(ORBIT)
-    slightly = run(edited(ORBIT, ("    - sin(t)\n", "    - 1.02*sin(t)\n")))
+    slightly = run(replaced(ORBIT, ("    - sin(t)\n", "    - 1.02*sin(t)\n")))
     defect = slightly["constants"]["plan_defect"]
     assert 0.01 < defect["below"] <= defect["above"] <= 1.02 * defect["below"]
     assert slightly["verdict"] == "certified"
     assert slightly["conditions_26"]["bandwidth"] > 1.05 * exact["conditions_26"]["bandwidth"]
-    badly = run(edited(ORBIT, ("    - sin(t)\n", "    - 2*sin(t)\n")))
+    badly = run(replaced(ORBIT, ("    - sin(t)\n", "    - 2*sin(t)\n")))
     assert badly["distance"]["verdict"] == "refuted"
     assert badly["distance"]["shortfalls"][0]["condition"] == "plan_defect"
 
 
 @pytest.mark.slow
 def test_a_tube_that_leaves_the_safe_set_is_refuted_with_time_and_point():
-    result = run(edited(ORBIT, ("  x2: [-6, 6]", "  x2: [-6, 1.6]")))
+    result = run(replaced(ORBIT, ("  x2: [-6, 6]", "  x2: [-6, 1.6]")))
     assert result["verdict"] == "refuted"
     (reason,) = result["reasons"]
     assert reason["claim"] == "tube_in_safe_set"
@@ -207,10 +201,10 @@ def test_a_tube_that_leaves_the_safe_set_is_refuted_with_time_and_point():
 
 @pytest.mark.slow
 def test_declared_bounds_are_checked_against_the_expression():
-    broken = run(edited(THREE, ('  h: ["0.1*sin(2*t)"]', '  h: ["0.1*sin(2*t)"]\n  bounds: {h: 0.09}')))
+    broken = run(replaced(THREE, ('  h: ["0.1*sin(2*t)"]', '  h: ["0.1*sin(2*t)"]\n  bounds: {h: 0.09}')))
     assert broken["verdict"] == "refuted"
     assert (broken["reasons"][0]["claim"], broken["reasons"][0]["constant"]) == ("uncertainty_bound", "h")
-    wide = run(edited(THREE, ('  h: ["0.1*sin(2*t)"]', '  h: ["0.1*sin(2*t)"]\n  bounds: {h: 0.2}')))
+    wide = run(replaced(THREE, ('  h: ["0.1*sin(2*t)"]', '  h: ["0.1*sin(2*t)"]\n  bounds: {h: 0.2}')))
     assert wide["verdict"] == "certified"
     assert wide["constants"]["h"]["above"] == 0.2
     assert wide["constants"]["h_t"]["above"] == pytest.approx(0.2, rel=0.01)
@@ -218,14 +212,14 @@ def test_declared_bounds_are_checked_against_the_expression():
 
 @pytest.mark.slow
 def test_declared_metric_bounds_must_hold_on_the_safe_set():
-    result = run(edited(THREE, ("  rate: 0.9999", "  bounds: {lower: 3.9, upper: 5.88}\n  rate: 0.9999")))
+    result = run(replaced(THREE, ("  rate: 0.9999", "  bounds: {lower: 3.9, upper: 5.88}\n  rate: 0.9999")))
     assert result["verdict"] == "refuted"
     assert (result["reasons"][0]["claim"], result["reasons"][0]["side"]) == ("metric_bound", "lower")
 
 
 @pytest.mark.slow
 def test_declared_uncertainty_alone_is_believed_and_named():
-    result = run(edited(THREE, ('  h: ["0.1*sin(2*t)"]', "  bounds: {h: 0.1, h_x: 0, h_t: 0.2}")))
+    result = run(replaced(THREE, ('  h: ["0.1*sin(2*t)"]', "  bounds: {h: 0.1, h_x: 0, h_t: 0.2}")))
     assert result["verdict"] == "certified"
     assert result["declared"] == {"h": 0.1, "h_x": 0.0, "h_t": 0.2}
     assert result["constants"]["h_initial"]["above"] == 0.1
@@ -233,11 +227,11 @@ def test_declared_uncertainty_alone_is_believed_and_named():
 
 @pytest.mark.slow
 def test_an_aperiodic_uncertainty_needs_a_horizon():
-    text = edited(THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + 0.01*sin(pi*t)"))
+    text = replaced(THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + 0.01*sin(pi*t)"))
     with pytest.raises(SpecError, match="horizon") as caught:
         run(text)
     assert caught.value.findings[0].code == "TC204"
-    with_horizon = edited(text, ("input: [0]}", "input: [0], horizon: 20}"))
+    with_horizon = replaced(text, ("input: [0]}", "input: [0], horizon: 20}"))
     assert run(with_horizon)["verdict"] == "certified"
 
 
@@ -246,7 +240,7 @@ def test_an_aperiodic_uncertainty_needs_a_horizon():
 )
 def test_an_undefined_expression_is_located_with_a_point(expression):
     with pytest.raises(SpecError) as caught:
-        run(edited(THREE, ("    - -x2\n", f"    - {expression}\n")))
+        run(replaced(THREE, ("    - -x2\n", f"    - {expression}\n")))
     (finding,) = caught.value.findings
     assert finding.code == "TC201"
     assert finding.location.line == 13
@@ -265,7 +259,7 @@ def test_an_undefined_expression_is_located_with_a_point(expression):
 )
 def test_a_point_is_said_to_be_near_a_zero_unless_it_is_one(expression, said):
     with pytest.raises(SpecError) as caught:
-        run(edited(THREE, ("    - -x2\n", f"    - {expression}\n")))
+        run(replaced(THREE, ("    - -x2\n", f"    - {expression}\n")))
     assert any(said in finding.message for finding in caught.value.findings)
 
 
@@ -275,14 +269,14 @@ def test_a_point_is_said_to_be_near_a_zero_unless_it_is_one(expression, said):
 )
 def test_what_depends_on_time_only_where_it_is_defined_needs_a_horizon(expression):
     with pytest.raises(SpecError, match="horizon") as caught:
-        run(edited(THREE, ("0.1*sin(2*t)", expression)))
+        run(replaced(THREE, ("0.1*sin(2*t)", expression)))
     assert caught.value.findings[0].code == "TC204"
-    assert run(edited(THREE, ("0.1*sin(2*t)", "0*(1/(sin(t) + 2)) + 0.1")))["verdict"] == "certified"
+    assert run(replaced(THREE, ("0.1*sin(2*t)", "0*(1/(sin(t) + 2)) + 0.1")))["verdict"] == "certified"
 
 
 @pytest.mark.slow
 def test_a_B_that_loses_rank_at_a_point_is_refuted_there():
-    result = run(edited(THREE, ("B: [[0], [0], [1]]", 'B: [[0], [0], ["x1 + x2 - 0.05"]]')))
+    result = run(replaced(THREE, ("B: [[0], [0], [1]]", 'B: [[0], [0], ["x1 + x2 - 0.05"]]')))
     assert result["verdict"] == "refuted"
     assert result["reasons"][0]["claim"] == "rank_of_B"
     x = result["reasons"][0]["at"]["x"]
@@ -291,7 +285,8 @@ def test_a_B_that_loses_rank_at_a_point_is_refuted_there():
 
 @pytest.mark.slow
 def test_any_start_within_a_radius_costs_more_than_the_nearest_and_no_more_than_the_ball(three):
-    around = run(edited(THREE, ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01732050808}")))  # |x0| of the point
+    within = "{within: 0.01732050808}"  # |x0| of the point
+    around = run(replaced(THREE, ("{at: [0.01, -0.01, 0.01]}", within)))
     assert around["verdict"] == "certified"
     assert around["spec"]["effective"]["initial_state"] == {"within": "0.01732050808"}
     assert around["tube"]["rho"] == pytest.approx(three["tube"]["rho"], rel=1e-6)
@@ -306,7 +301,7 @@ def test_any_start_within_a_radius_costs_more_than_the_nearest_and_no_more_than_
 
 @pytest.mark.slow
 def test_a_start_within_a_radius_bounds_the_uncertainty_over_all_starts():
-    text = edited(
+    text = replaced(
         THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + x1"), ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01}")
     )
     result = run(text, conditions="distance")
@@ -343,10 +338,10 @@ def test_a_constant_without_a_bound_stops_only_what_needs_it(supremum, loser, mo
 def test_who_gives_no_radii_is_told_of_half_widths_and_who_gives_one_is_not():
     """Nobody who is new knows what epsilon is; how far each state may be off, in its unit, they know."""
     with pytest.raises(SpecError) as caught:
-        run(edited(THREE, ("epsilon: 0.01, rho_a: 0.01", "gap: auto")))
+        run(replaced(THREE, ("epsilon: 0.01, rho_a: 0.01", "gap: auto")))
     both = [finding.help for finding in caught.value.findings if finding.help]
     assert any("half_widths: {x1: ..., x2: ..., x3: ...}" in each for each in both)
     with pytest.raises(SpecError) as caught:
-        run(edited(THREE, ("epsilon: 0.01, rho_a: 0.01", "rho_a: 0.01")))
+        run(replaced(THREE, ("epsilon: 0.01, rho_a: 0.01", "rho_a: 0.01")))
     (one,) = (finding.help for finding in caught.value.findings)
     assert "half_widths" not in one

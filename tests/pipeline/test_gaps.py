@@ -1,12 +1,12 @@
 """Gaps by effect: gains as with close constants, enclosures that hold, and certificates that say what was done."""
 
 from fractions import Fraction
-from pathlib import Path
 
 import pytest
 from proven import proven
 from rechecked import certified, examine, sealed
 from systems import SMALL
+from texts import CONFIGS
 
 from tubecert.pipeline import Memory, Options, question_of
 from tubecert.pipeline.certification import plan, tube
@@ -15,7 +15,6 @@ from tubecert.spec import load
 from tubecert.stages.bounded import enclose
 from tubecert.stages.metric import prove_metric
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 MEMORY = Memory()
 CLOSE = Fraction(1, 1000)
 

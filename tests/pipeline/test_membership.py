@@ -5,12 +5,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from commands import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from proven import proven
-from typer.testing import CliRunner
 
-from tubecert.cli.app import app
 from tubecert.findings import Severity
 from tubecert.pipeline.membership import membership
 from tubecert.spec import load_text
@@ -96,10 +95,6 @@ def sampled(a, w, count):
         )
         for s in t
     ]
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
 
 
 @pytest.fixture

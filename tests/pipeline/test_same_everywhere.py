@@ -9,16 +9,15 @@ import os
 import platform
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from proven import result
 from systems import SMALL
+from texts import ROOT
 
 from tubecert import certificate
 
-ROOT = Path(__file__).parents[2]
 CONFIGS = {  # each on one other processor; all of them on several are what `.ci/run` is for
     "Haswell": ("three_state", "two_state_orbit"),
     "oldest": ("two_state", "state_dependent_input"),

@@ -2,9 +2,10 @@
 
 from dataclasses import fields, replace
 from fractions import Fraction
-from pathlib import Path
 
 import pytest
+from systems import ONE
+from texts import CONFIGS
 
 from tubecert.bounds.compute import Radius
 from tubecert.enclosure.interval import Interval
@@ -19,22 +20,8 @@ from tubecert.stages.metric import ProvenMetric, prove_metric
 from tubecert.stages.question import Stopped
 from tubecert.stages.tube import TubeFound
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 THREE = load(str(CONFIGS / "three_state.yaml"))
 PLANNED = (CONFIGS / "two_state.yaml").read_text(encoding="utf-8").replace("  knots: 101", "  knots: 26")
-
-
-ONE = """tubecert: 1
-name: one
-system: {states: [x], inputs: [u], parameters: {k: 1}, f: [-k*x], B: [[1]]}
-safe_set: {x: [-1, 1]}
-uncertainty: {h: [0.1*sin(t)]}
-trajectory: {kind: equilibrium, at: [0], horizon: 10}
-initial_state: {at: [0.05]}
-metric: {rate: 0.5, dual_metric: [[1]]}
-tube: {epsilon: 0.2, rho_a: 0.1}
-adaptation: {A_m: -1}
-"""
 
 
 def radii(epsilon, rho_a):

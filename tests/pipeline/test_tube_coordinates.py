@@ -2,10 +2,10 @@
 
 import re
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
+from texts import CONFIGS
 
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import FitTube
@@ -20,7 +20,6 @@ from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 COARSE = Options(gap=Fraction(1, 5))
 pytestmark = pytest.mark.usefixtures("barely")
 # a link and a motor behind a spring; W for speeds in rad/s

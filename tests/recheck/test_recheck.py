@@ -9,10 +9,10 @@ import proven
 import pytest
 import rechecked
 import tampers
+from commands import run
 from flint import ctx
 from rechecked import examine, respecified, sealed, written
 from systems import SMALL
-from typer.testing import CliRunner
 
 import tubecert.bounds.start
 import tubecert.conditions.kernels
@@ -22,7 +22,6 @@ import tubecert.enclosure.interval
 import tubecert.expression.calculus
 import tubecert.model
 from tubecert import pipeline, spec
-from tubecert.cli.app import app
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.model import ControlAffineModel
 from tubecert.recheck.constants import OVER_TUBE, bounded
@@ -272,7 +271,7 @@ def certified(tmp_path):
 
 
 def command(*arguments):
-    return CliRunner().invoke(app, ["recheck", *map(str, arguments)])
+    return run("recheck", *arguments)
 
 
 @pytest.mark.slow

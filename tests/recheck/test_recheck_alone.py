@@ -3,7 +3,8 @@
 import copy
 
 import pytest
-from rechecked import CONFIGS, certified, examine, failing, unconfirmed
+from rechecked import certified, examine, failing, unconfirmed
+from texts import CONFIGS
 
 CALM = (
     (CONFIGS / "two_state_orbit.yaml")

@@ -5,8 +5,9 @@ from fractions import Fraction
 
 import pytest
 import yaml
-from rechecked import CONFIGS, certified, doubted, examine, failing, respecified, sealed, unconfirmed
+from rechecked import certified, doubted, examine, failing, respecified, sealed, unconfirmed
 from systems import SMALL
+from texts import CONFIGS
 
 from tubecert.recheck.clearances import _square, _turned
 from tubecert.recheck.obstacles import Shape, is_simple

@@ -5,12 +5,12 @@ import json
 from fractions import Fraction
 
 import pytest
+from commands import run
 from rechecked import certified, examine, failing, respecified, sealed, terms
 from systems import SMALL
-from typer.testing import CliRunner
+from texts import replaced
 
 from tubecert import certificate, pipeline, spec
-from tubecert.cli.app import app
 from tubecert.errors import ExitCode
 from tubecert.recheck.balls import exact
 from tubecert.recheck.identity import vanish
@@ -33,13 +33,6 @@ metric: {rate: 0.7, dual_metric: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
 tube: {epsilon: 0.1, rho_a: 0.1}
 adaptation: {A_m: -10}
 """
-
-
-def replaced(text, *changes):
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return text
 
 
 H, START = 'h: ["0.1*sin(t) + 0.05*x"]', "initial_state: {at: [0.05, 0]}"
@@ -255,7 +248,7 @@ def test_what_is_locked_may_have_half_widths(files):
 
 
 def command(*arguments):
-    return CliRunner().invoke(app, ["recheck", "-q", *map(str, arguments)])
+    return run("recheck", "-q", *arguments)
 
 
 @pytest.mark.slow
@@ -316,7 +309,7 @@ def test_a_synthesised_metric_belongs_to_the_file_that_asked_for_it(tmp_path):
     path.write_text(text, encoding="utf-8")
     target = tmp_path / "out.json"
     arguments = ["certify", str(path), "--conditions", "distance", "-q", "-o", str(target)]
-    made = CliRunner().invoke(app, arguments)
+    made = run(*arguments)
     assert made.exit_code == 0, made.output
     done = command(target, "--spec", path)
     assert done.exit_code == 0, done.output

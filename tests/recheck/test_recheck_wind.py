@@ -4,8 +4,9 @@ import copy
 
 import pytest
 import tampers
-from rechecked import CONFIGS, certified, examine, failing, respecified, sealed, unconfirmed
+from rechecked import certified, examine, failing, respecified, sealed, unconfirmed
 from systems import BLOWN, COMING_TO_REST, DISTURBED, SMALL
+from texts import CONFIGS
 
 RANGES = SMALL.replace("0.3*sin(x)", "m*sin(x)").replace(
     "  inputs: [u]", "  inputs: [u]\n  parameters: {m: [0.2, 0.4], c: [-0.01, 0.01]}"

@@ -16,17 +16,17 @@ import numpy as np
 import pages
 import pytest
 import sympy
+from commands import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import margins_26, problem_of
 from proven import result as certified_result
-from typer.testing import CliRunner
+from texts import CONFIGS, ROOT
 
 from tubecert import certificate, pipeline
 from tubecert.bounds.constants import EVERY
 from tubecert.certificate.result import Certificate, Result
 from tubecert.claims.family import Assumption
-from tubecert.cli.app import app
 from tubecert.conditions.rates import RateRecipe
 from tubecert.digits import percent, up
 from tubecert.expression import to_text
@@ -39,8 +39,6 @@ from tubecert.report.figures_axes import Axis, _hexagon, number
 from tubecert.report.figures_file import painted
 from tubecert.spec import load, load_text
 
-ROOT = Path(__file__).parents[2]
-CONFIGS = ROOT / "configs"
 ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text(encoding="utf-8")
 MADE = {
     "certified": certificates.certified,
@@ -505,10 +503,6 @@ def proven(monkeypatch):
     return calls
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, list(map(str, arguments)), prog_name="tubecert")
-
-
 def test_certify_writes_pages_beside_the_certificate(folder, proven):
     done = run("certify", "plant.yaml", "--report", "a.html", "--report", "b.md")
     assert done.exit_code == 0, done.output
@@ -520,7 +514,7 @@ def test_certify_writes_pages_beside_the_certificate(folder, proven):
 
 
 def test_a_page_goes_well_with_the_certificate_on_stdout(folder, proven):
-    done = CliRunner().invoke(app, ["certify", "plant.yaml", "-o", "-", "--report", "a.htm"])
+    done = run("certify", "plant.yaml", "-o", "-", "--report", "a.htm")
     assert json.loads(done.stdout)["result"]["verdict"] == "certified"
     assert Path("a.htm").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
 

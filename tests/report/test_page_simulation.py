@@ -6,11 +6,10 @@ import os
 import certificates
 import pages
 import pytest
-from typer.testing import CliRunner
+from commands import run
 
 import tubecert as tc
 from tubecert import certificate
-from tubecert.cli.app import app
 from tubecert.errors import TargetError
 
 DRAWING = '<svg xmlns="http://www.w3.org/2000/svg"><script>alert(1)</script></svg>'
@@ -37,7 +36,7 @@ def made(tmp_path):
 def test_figures_are_images_in_which_nothing_runs(made):
     target = made / "page.html"
     words = [str(made / "plant.json"), "--simulation", str(made / "plant.simulation"), "-o", str(target)]
-    assert CliRunner().invoke(app, ["report", *words]).exit_code == 0
+    assert run("report", *words).exit_code == 0
     source = target.read_text(encoding="utf-8")
     page = pages.Page(source)
     assert "Outcome: not falsified. A simulation can falsify a certificate" in page.text

@@ -3,9 +3,9 @@
 import io
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from texts import CONFIGS
 
 from tubecert.kinds import NAMES
 from tubecert.pipeline.counting import Claims, claims_of
@@ -14,8 +14,6 @@ from tubecert.report.progress import Log, Pieces, Timed, shown
 from tubecert.report.terminal import Terminal
 from tubecert.spec import load
 from tubecert.words.progress import described
-
-CONFIGS = Path(__file__).parents[2] / "configs"
 
 
 class Clock:

@@ -5,10 +5,9 @@ from fractions import Fraction
 
 import pytest
 from certificates import certified
-from typer.testing import CliRunner
+from commands import run
 
 from tubecert.certificate.result import MetricFile, Result, SolverData
-from tubecert.cli.app import app
 from tubecert.enclosure.constant import Constant
 from tubecert.report import certificate_brief, certificate_page, claimed, synthesis
 
@@ -89,7 +88,7 @@ def test_what_is_said_of_w_is_read_from_its_expressions():
 def test_of_a_metric_in_fields_of_b_it_is_not_said_that_it_is_constant(tmp_path):
     path, target = tmp_path / "plant.yaml", tmp_path / "plant.metric.json"
     path.write_text(PLANT + "metric: {synthesise: {}}\n", "utf-8")
-    run = CliRunner().invoke(app, ["synth", str(path), "--rate", "0.3", "-o", str(target)])
-    assert run.exit_code == 0
+    done = run("synth", path, "--rate", "0.3", "-o", target)
+    assert done.exit_code == 0
     assert "v" in json.dumps(json.loads(target.read_text("utf-8"))["dual_metric"])
-    assert "W depends on v" in run.output
+    assert "W depends on v" in done.output

@@ -5,6 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 from small_loops import SCALAR, result_of
+from texts import replaced
 
 from tubecert.sampled_loop.record import Result, Tables
 from tubecert.simulation.sampled.setting import Setting, setting_of
@@ -52,8 +53,5 @@ def proven(name: str) -> Result:
 
 def setting(name: str, *changes: tuple[str, str], duration: str | None = None) -> Setting:
     """Its setting; `changes` of the text make another plant, whose certificate is a lie."""
-    text = ABOUT[name][0]
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
+    text = replaced(ABOUT[name][0], *changes)
     return setting_of(load_text(text), proven(name), duration and Fraction(duration))

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from commands import run
 from simulated import FLAT, certified, setting
-from typer.testing import CliRunner
 
 from tubecert.certificate import dump, seal
-from tubecert.cli.app import app
 from tubecert.executor import Processes, Serial
 from tubecert.simulation.adaptive import attack, engine
 from tubecert.simulation.adaptive import campaign as campaigns
@@ -21,10 +20,6 @@ from tubecert.simulation.adaptive.setting import Choice, loop_of
 
 pytestmark = pytest.mark.timeout(240)  # the first run compiles
 LOCATED = re.compile(r"(^|\n)(\S+:\d+:\d+: |--[a-z-]+: )?error TC\d{3}: ")
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
 
 
 @pytest.fixture(autouse=True)

@@ -5,7 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from simulated import CONFIGS, FLAT, certified, setting
+from simulated import FLAT, certified, setting
+from texts import CONFIGS
 
 import tubecert
 from tubecert import asking, pipeline

@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from simulated import alone
 from systems import plain_model
+from texts import CONFIGS
 
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
@@ -20,7 +20,6 @@ from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import constant_plan
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 X, Y, T = symbol("x1"), symbol("x2"), symbol("t")
 W2 = np.array([[4.25828, -0.93423], [-0.93423, 3.76692]])
 RATE = 1.74

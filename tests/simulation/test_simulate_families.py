@@ -6,12 +6,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from commands import run
 from proven import proven
 from systems import FAMILY_TWO
-from typer.testing import CliRunner
 
 from tubecert.certificate.result import Certificate
-from tubecert.cli.app import app
 from tubecert.errors import TubecertError
 from tubecert.findings import Severity
 from tubecert.model import build
@@ -170,7 +169,7 @@ def test_one_plan_has_no_members(option, tmp_path):
         "metric: {rate: 1.74, dual_metric: [[4, -1], [-1, 4]]}\n"
     )
     (tmp_path / "one.yaml").write_text(text)
-    done = CliRunner().invoke(app, ["simulate", str(tmp_path / "one.yaml"), option, "3"])
+    done = run("simulate", tmp_path / "one.yaml", option, "3")
     assert done.exit_code == 2
     assert "TC708" in done.output
     assert "not a family" in done.output

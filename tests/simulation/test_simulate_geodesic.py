@@ -3,20 +3,19 @@
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from problems import W_CONSTANT, W_LINEAR, W_SQUARE
 from scipy.integrate import solve_ivp
 from systems import plain_model
+from texts import CONFIGS
 
 from tubecert.expression import as_expression, exp, sin, symbol
 from tubecert.model import build
 from tubecert.simulation.adaptive.geodesics import FOUND, NOT_POSITIVE, REASONS, Geodesics
 from tubecert.spec import load_text
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 X, Y = symbol("x"), symbol("y")
 THREE = build(load_text((CONFIGS / "three_state.yaml").read_text(encoding="utf-8"), "three_state.yaml"))
 

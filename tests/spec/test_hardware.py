@@ -6,6 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from texts import replaced
 
 import tubecert
 from tubecert import pipeline
@@ -36,10 +37,7 @@ FAMILY = (
 
 
 def changed(*changes, text=BASE):
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return load_text(text, "small.yaml")
+    return load_text(replaced(text, *changes), "small.yaml")
 
 
 def hardware(text):

@@ -3,11 +3,11 @@
 import json
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from texts import ROOT
 
 from tubecert.checking.cache import key_of_system, key_of_text
 from tubecert.errors import SpecError
@@ -15,7 +15,6 @@ from tubecert.spec import Setting, Spec, canonical, load_text
 from tubecert.spec.load import again, load_source
 from tubecert.spec.source import Source
 
-ROOT = Path(__file__).parents[2]
 TWO = (ROOT / "configs" / "two_state.yaml").read_text(encoding="utf-8")
 MINIMAL = (ROOT / "tests/specs/ok/minimal.yaml").read_text(encoding="utf-8")
 PARAMETER = MINIMAL.replace("{states", "{parameters: {m: 2, k: m/4}, states")

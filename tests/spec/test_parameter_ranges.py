@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import pytest
 from systems import SMALL
+from texts import replaced
 
 from tubecert.errors import SpecError
 from tubecert.expression import to_text
@@ -17,10 +18,7 @@ def with_mass(f="m*sin(x)", ranges="m: [0.2, 0.4]", definitions="", **changes):
     text = SMALL.replace("0.3*sin(x)", f).replace(
         "  inputs: [u]", f"  inputs: [u]\n  parameters: {{{ranges}}}{definitions}"
     )
-    for old, new in changes.values():
-        assert old in text
-        text = text.replace(old, new)
-    return text
+    return replaced(text, *changes.values())
 
 
 def test_the_controller_knows_the_middle():

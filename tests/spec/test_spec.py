@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from texts import ROOT
 
 from tubecert.certificate.effective import as_file
 from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
@@ -21,7 +22,6 @@ from tubecert.recheck.specification import read_specification
 from tubecert.recheck.system import system_of
 from tubecert.spec import canonical, codes, load, load_question, load_text
 
-ROOT = Path(__file__).parents[2]
 OK = sorted((ROOT / "tests/specs/ok").glob("*.yaml"))
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 BAD = sorted((ROOT / "tests/specs/bad").glob("*.yaml"))

@@ -11,10 +11,10 @@ import time
 import xml.etree.ElementTree as ET
 
 import pytest
-from typer.testing import CliRunner
+from commands import run
+from systems import ONE
 
 from tubecert import pipeline
-from tubecert.cli.app import app
 from tubecert.errors import SpecError, TargetError
 from tubecert.executor import Cluster, Serial, WorkerError
 from tubecert.pipeline import Options
@@ -26,22 +26,7 @@ from tubecert.sweep.point import Task, memory_of
 from tubecert.sweep.run import Sweep
 
 pytestmark = pytest.mark.timeout(240)
-ONE = """tubecert: 1
-name: one
-system: {states: [x], inputs: [u], parameters: {k: 1}, f: [-k*x], B: [[1]]}
-safe_set: {x: [-1, 1]}
-uncertainty: {h: [0.1*sin(t)]}
-trajectory: {kind: equilibrium, at: [0], horizon: 10}
-initial_state: {at: [0.05]}
-metric: {rate: 0.5, dual_metric: [[1]]}
-tube: {epsilon: 0.2, rho_a: 0.1}
-adaptation: {A_m: -1}
-"""
 OVER = ("--over", "tube.epsilon=.2,.4,1.2,-1")
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="tubecert")
 
 
 def sweep_of(folder, *over, fixed=(), **options):

@@ -3,25 +3,23 @@
 import json
 import re
 import warnings
-from pathlib import Path
 
 import cvxpy
 import numpy as np
 import pytest
+from commands import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import semidefinite
 from systems import SMALL
-from typer.testing import CliRunner
+from texts import ROOT
 
 from tubecert import pipeline
-from tubecert.cli.app import app
 from tubecert.errors import SpecError
 from tubecert.spec import canonical, load_text
 from tubecert.synthesis import conic
 from tubecert.synthesis.conic import Affine, ConicProgram, Semidefinite, solve
 
-ROOT = Path(__file__).parents[2]
 TWO = ROOT / "configs" / "two_state.yaml"
 EIGENVALUE = ConicProgram(cost=np.ones(1), semidefinite=[semidefinite([[-1, -2], [-2, -1]], [np.eye(2)])])
 
@@ -111,9 +109,7 @@ def test_inaccurate_is_not_finished(monkeypatch):
 )
 def test_a_solver_that_is_not_there_is_refused_with_those_that_are(solver, why, tmp_path):
     target = tmp_path / "metric.json"
-    done = CliRunner().invoke(
-        app, ["synth", str(TWO), "--rate", "1.5", "--solver", solver, "-o", str(target)]
-    )
+    done = run("synth", TWO, "--rate", "1.5", "--solver", solver, "-o", target)
     assert done.exit_code == 2
     assert f"error TC122: the solver {solver} cannot be used: {solver[6:]} {why}" in done.stderr
     assert "installed: cvxpy:CLARABEL, cvxpy:SCS; also: clarabel, scs" in " ".join(done.stderr.split())
@@ -125,7 +121,7 @@ def test_a_solver_that_is_not_there_is_refused_with_those_that_are(solver, why, 
     "text", ["cvxpy", "cvxpy:", "cvxpy:A B", "CVXPY:SCS", "mosek", "cvxpy:" + 40 * "A", ""]
 )
 def test_what_names_no_solver_is_refused(text):
-    done = CliRunner().invoke(app, ["synth", str(TWO), "--rate", "1.5", "--solver", text])
+    done = run("synth", TWO, "--rate", "1.5", "--solver", text)
     assert done.exit_code == 2
     assert "TC112" in done.stderr
     assert "cvxpy:NAME" in done.stderr
@@ -143,7 +139,7 @@ def test_metrics_are_found_and_proven_as_ever(tmp_path):
     found = {}
     for solver in ("clarabel", "cvxpy:clarabel"):
         options = ["--rate", "1.7", "--solver", solver, "-o", str(target)]
-        done = CliRunner().invoke(app, ["synth", str(TWO), *options])
+        done = run("synth", TWO, *options)
         assert done.exit_code == 0, done.output
         found[solver] = json.loads(target.read_text())["condition_number"][1]
     assert found["cvxpy:clarabel"] == pytest.approx(found["clarabel"], rel=0.01)
@@ -158,5 +154,5 @@ def test_a_lie_writes_no_metric(monkeypatch, tmp_path):
     )
     target = tmp_path / "metric.json"
     options = ["--rate", "1.7", "--degree", "0", "--solver", "cvxpy:CLARABEL", "-o", str(target)]
-    assert CliRunner().invoke(app, ["synth", str(TWO), *options]).exit_code == 4
+    assert run("synth", TWO, *options).exit_code == 4
     assert not target.exists()

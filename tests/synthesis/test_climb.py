@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
+from texts import CONFIGS
 
 from tubecert import pipeline
 from tubecert.claims.advice import ConstantInputs, MeasureTube
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.statements import TubeInSafeSet
-from tubecert.cli.app import app
 from tubecert.expression import scan
 from tubecert.model import build
 from tubecert.pipeline import Deadline, Options, synthesis
@@ -25,7 +25,6 @@ from tubecert.spec import Synthesis, load, load_text
 from tubecert.verdict import Verdict
 
 ROBOTS = Path(__file__).parents[1] / "specs" / "robots"
-CONFIGS = Path(__file__).parents[2] / "configs"
 BARE = Synthesis(rate=None, objective="adaptation")
 BY_B = Options(conditions="distance")
 
@@ -34,8 +33,8 @@ def robot(name):
     return load(str(ROBOTS / f"{name}.yaml"))
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, ["synth", "--no-progress", *map(str, arguments)], catch_exceptions=False)
+def synth(*arguments):
+    return run("synth", "--no-progress", *arguments, catch_exceptions=False)
 
 
 @pytest.mark.usefixtures("barely")
@@ -65,7 +64,7 @@ def test_certify_finds_a_metric_by_itself_and_recheck_confirms_it(tmp_path):
         ["recheck", target, "--spec", spec],
         ["report", target, "-o", str(tmp_path / "p.html")],
     ):
-        done = CliRunner().invoke(app, arguments, catch_exceptions=False)
+        done = run(*arguments, catch_exceptions=False)
         assert done.exit_code == 0, done.output
     written = json.loads(Path(target).read_text())
     assert written["notes"]["synthesis"]["search"]["limits"]["slower"]["cause"] == "distance"
@@ -88,7 +87,7 @@ def test_where_nothing_certifies_nothing_is_written(tmp_path):
     path, target = tmp_path / "wide.yaml", tmp_path / "wide.json"
     path.write_text(text)
     target.write_text("older")
-    done = run(path, "-o", target)
+    done = synth(path, "-o", target)
     assert done.exit_code == 4
     assert target.read_text() == "older"
     assert "certifies: the tube leaves the safe set" in " ".join(done.stdout.split())
@@ -123,11 +122,11 @@ def test_a_certificate_that_says_so_is_read_and_rechecked(tmp_path):
     (tmp_path / "wide.yaml").write_text(text)
     target = str(tmp_path / "wide.json")
     arguments = ["certify", str(tmp_path / "wide.yaml"), "--no-progress", "-o", target]
-    done = CliRunner().invoke(app, arguments, catch_exceptions=False)
+    done = run(*arguments, catch_exceptions=False)
     assert done.exit_code == 4
     assert json.loads(Path(target).read_text())["result"]["reasons"][0]["failure"]["id"] == "none_certified"
     for command in ("recheck", "report"):
-        again = CliRunner().invoke(app, [command, target], catch_exceptions=False)
+        again = run(command, target, catch_exceptions=False)
         assert again.exit_code in (0, 4), again.output
 
 
@@ -315,7 +314,7 @@ def interrupt_at_the_second_metric(monkeypatch):
 def test_an_interruption_leaves_the_best_that_was_proven(monkeypatch, tmp_path):
     calls = interrupt_at_the_second_metric(monkeypatch)
     target = tmp_path / "m.json"
-    done = run(ROBOTS / "van_der_pol.yaml", "-o", target)
+    done = synth(ROBOTS / "van_der_pol.yaml", "-o", target)
     assert done.exit_code == 130
     assert "interrupted: this is the best" in done.stdout
     assert json.loads(target.read_text())["rate"] == float(calls[0].rate)
@@ -329,7 +328,7 @@ def test_an_interruption_tells_what_was_tried_where_nothing_certified(monkeypatc
     hopeless, target = tmp_path / "hopeless.yaml", tmp_path / "m.json"
     hopeless.write_text(text.replace("epsilon: 0.2", "epsilon: 5"))  # larger than the safe set
     target.write_text("older")
-    done = run(hopeless, "-o", target)
+    done = synth(hopeless, "-o", target)
     assert done.exit_code == 130
     assert "interrupted: no metric that certifies was found by then" in done.stdout
     assert "kappa" in done.stdout

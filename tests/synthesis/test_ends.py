@@ -4,12 +4,11 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from typer.testing import CliRunner
+from commands import run
 
 from tubecert import pipeline
 from tubecert.claims.advice import CorrectPlan, MendPlan
 from tubecert.claims.statements import ConditionHolds, PlanBounded
-from tubecert.cli.app import app
 from tubecert.model import build
 from tubecert.pipeline import Options
 from tubecert.pipeline.climb import Climb
@@ -105,7 +104,7 @@ def test_a_plan_that_is_none_is_said_after_two_rates(tmp_path):
     assert mend.remedy == CorrectPlan()
     assert mend.share == min(row.missed for row in found.rows) > 1
     (tmp_path / "trim.yaml").write_text(TRIM.replace("SPEED", "0.4"))
-    done = CliRunner().invoke(app, ["synth", str(tmp_path / "trim.yaml"), "-o", str(tmp_path / "m.json")])
+    done = run("synth", tmp_path / "trim.yaml", "-o", tmp_path / "m.json")
     assert done.exit_code == 4
     assert "it is the plan that has to be mended" in " ".join(done.stdout.split())
     assert not (tmp_path / "m.json").exists()
@@ -142,7 +141,7 @@ def test_synth_ends_with_the_first_of_them_unless_an_objective_is_asked_for(tmp_
     path.write_text(LAG.replace("0.3*", "0.03*"))
     said = []
     for more in ([], ["--objective", "adaptation"]):
-        done = CliRunner().invoke(app, ["synth", str(path), "-o", str(target), "--degree", "0", *more])
+        done = run("synth", path, "-o", target, "--degree", "0", *more)
         assert done.exit_code == 0
         said.append(" ".join(done.stdout.split()))
     words = "ended with the first metric whose tube needs no adaptation (certificate 0)"
@@ -157,11 +156,11 @@ def test_what_certifies_by_another_certificate_only_is_not_written(tmp_path):
     arguments = ["synth", str(path), "--rate", "0.2", "--objective", "adaptation", "--degree", "0"]
     arguments += ["-o", str(target)]
     path.write_text(hopeless + "conditions: {decides: '0'}\n")
-    done = CliRunner().invoke(app, arguments)
+    done = run(*arguments)
     assert (done.exit_code, target.exists()) == (4, False), done.stdout
     assert done.stdout.startswith("undecided lag: the metric at rate 0.2 1/s does not certify")
     path.write_text(hopeless + "conditions: {decides: B}\n")
-    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert run(*arguments).exit_code == 0
 
 
 def chain(states, *moving):
@@ -195,9 +194,9 @@ def test_and_is_said_before_it_starts(tmp_path, monkeypatch):
     monkeypatch.setattr(pipeline, "synthesise", search)
     (tmp_path / "large.yaml").write_text(chain(12, 0, 3, 5))
     arguments = ["synth", str(tmp_path / "large.yaml"), "--rate", "1", "-o", str(tmp_path / "m.json")]
-    done = CliRunner().invoke(app, arguments)
+    done = run(*arguments)
     assert done.exit_code == 130
     said = " ".join(done.stderr.split())
     assert "warning: 12 states, and slopes that depend on 3 of them" in said
     assert "78 unknown entries" in said
-    assert "warning" not in CliRunner().invoke(app, [*arguments, "-q"]).stderr
+    assert "warning" not in run(*arguments, "-q").stderr

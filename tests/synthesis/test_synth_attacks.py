@@ -7,16 +7,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from commands import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import fractions
 from systems import plain_model as model
-from typer.testing import CliRunner
 
 from tubecert import pipeline
 from tubecert.claims.advice import LowerDegree
 from tubecert.claims.failures import NotProvenAsWritten, NotWritable, RankUnproven
-from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import scan
 from tubecert.metric.verify import verify_metric
@@ -30,11 +29,11 @@ QUICK = settings(max_examples=30, deadline=None)
 
 
 def synth(*arguments):
-    return CliRunner().invoke(app, ["synth", *map(str, arguments)])
+    return run("synth", *arguments)
 
 
 def certify(*arguments):
-    return CliRunner().invoke(app, ["certify", *map(str, arguments)])
+    return run("certify", *arguments)
 
 
 SPEC = """tubecert: 1

@@ -3,18 +3,17 @@
 import json
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from systems import plain_model as model
-from typer.testing import CliRunner
+from texts import ROOT
 
 from tubecert.claims.failures import VariableForbidden
 from tubecert.claims.statements import MetricContraction
-from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import round_down
 from tubecert.enclosure.tape import Tape
@@ -29,9 +28,6 @@ from tubecert.synthesis.family import FamilyError, invariants, metric_family, su
 from tubecert.synthesis.ladder import Ladder, Request, routes, shrunk
 from tubecert.synthesis.problem import Proposal
 from tubecert.synthesis.rounding import Rejected, rounded, shortest_proven
-
-ROOT = Path(__file__).parents[2]
-
 
 D = "(1 + 0.2*sin(th)**2)"
 CART_POLE = model(
@@ -249,7 +245,7 @@ def test_a_lying_solver_writes_no_file(kind, tmp_path, monkeypatch):
     target = tmp_path / "metric.json"
     target.write_text("old")
     spec = str(ROOT / "configs" / "two_state.yaml")
-    done = CliRunner().invoke(app, ["synth", spec, "--rate", "1.7", "--degree", "0", "-v", "-o", str(target)])
+    done = run("synth", spec, "--rate", "1.7", "--degree", "0", "-v", "-o", target)
     assert done.exit_code == 4
     assert target.read_text() == "old"
     assert "undecided two_state" in done.output
@@ -273,7 +269,7 @@ def test_an_infeasible_answer_marked_optimal_is_rejected_with_its_reason():
 
 
 def synth(*arguments):
-    return CliRunner().invoke(app, ["synth", *map(str, arguments)])
+    return run("synth", *arguments)
 
 
 @pytest.mark.slow
@@ -287,9 +283,7 @@ def test_the_three_state_metric(tmp_path):
     assert content["margin"][0] > 0
     again = with_metric(load(str(spec)), str(target))
     assert verify_metric(build(again), again.safe_set, Effort()).verdict == "certified"
-    certified = CliRunner().invoke(
-        app, ["certify", str(spec), "--metric", str(target), "-q", "-o", str(tmp_path / "c.json")]
-    )
+    certified = run("certify", spec, "--metric", target, "-q", "-o", tmp_path / "c.json")
     assert certified.exit_code == 0, certified.output
 
 

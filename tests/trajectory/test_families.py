@@ -15,7 +15,6 @@ from systems import FAMILY_TWO as FAMILY
 
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate import dump, seal
-from tubecert.cli.app import app
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.model import build
@@ -344,7 +343,7 @@ def test_samples_in_a_result_are_refused(document):
 
 @pytest.mark.slow
 def test_a_plan_of_ones_own_is_followed_if_it_is_of_the_family(tmp_path, monkeypatch, document):
-    from typer.testing import CliRunner
+    from commands import run
 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "any.yaml").write_text(FAMILY)
@@ -353,10 +352,10 @@ def test_a_plan_of_ones_own_is_followed_if_it_is_of_the_family(tmp_path, monkeyp
     (tmp_path / "rest.yaml").write_text(FAMILY.replace(OWN, rest))
     (tmp_path / "far.yaml").write_text(FAMILY.replace(OWN, rest.replace("input: [0]", "input: [2]")))
     arguments = ["simulate", "any.yaml", "--certificate", "any.json", "--runs", "2", "--plan"]
-    done = CliRunner().invoke(app, [*arguments, "rest.yaml"])
+    done = run(*arguments, "rest.yaml")
     assert done.exit_code == 0, done.output
     assert "not falsified" in done.output
-    done = CliRunner().invoke(app, [*arguments, "far.yaml"])
+    done = run(*arguments, "far.yaml")
     assert done.exit_code == 2
     assert "TC411" in done.output
     assert "u* goes 1 beyond its range" in done.output

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from problems import judged_distance
+from texts import CONFIGS, replaced
 
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
@@ -23,7 +24,7 @@ from tubecert.planner.propose import course_of, grid, knots_of, rounded
 from tubecert.spec import load, load_text
 from tubecert.trajectory.make import Room, plan_of
 
-CONFIG = Path(__file__).parents[2] / "configs" / "two_state.yaml"
+CONFIG = CONFIGS / "two_state.yaml"
 TEXT = CONFIG.read_text(encoding="utf-8")
 SPEC = load_text(TEXT, "spec.yaml")
 MODEL = build(SPEC)
@@ -48,11 +49,7 @@ def own_cache(shared_cache, monkeypatch):
 
 
 def edited(*changes):
-    text = TEXT
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    return load_text(text, "spec.yaml")
+    return load_text(replaced(TEXT, *changes), "spec.yaml")
 
 
 # without a goal nothing is planned a second time with finer steps
