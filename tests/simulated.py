@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from proven import barely
 from shared import once
+from systems import FLAT
 from texts import CONFIGS
 
 from tubecert import pipeline
@@ -17,18 +18,6 @@ from tubecert.simulation.adaptive.reading import adopted
 from tubecert.simulation.adaptive.setting import Setting, setting_of
 from tubecert.simulation.lanes import Found
 from tubecert.spec import Spec, load, load_text
-
-FLAT = """
-tubecert: 1
-name: flat
-system: {states: [p, v], inputs: [u], f: [v, "-p - v"], B: [[0], [1]]}
-safe_set: {p: [-2, 2], v: [-2, 2]}
-uncertainty: {h: ["0.2*sin(t)"]}
-trajectory: {kind: equilibrium, at: [0, 0], horizon: 4}
-initial_state: {at: [0.05, 0]}
-metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
-tube: {epsilon: 0.2, rho_a: 0.2}
-"""
 
 
 @lru_cache

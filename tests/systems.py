@@ -200,6 +200,19 @@ tube: {epsilon: 0.2, rho_a: 0.1}
 adaptation: {A_m: -1}
 """
 
+# a mass on a spring with friction, at rest for a while
+FLAT = """
+tubecert: 1
+name: flat
+system: {states: [p, v], inputs: [u], f: [v, "-p - v"], B: [[0], [1]]}
+safe_set: {p: [-2, 2], v: [-2, 2]}
+uncertainty: {h: ["0.2*sin(t)"]}
+trajectory: {kind: equilibrium, at: [0, 0], horizon: 4}
+initial_state: {at: [0.05, 0]}
+metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
+tube: {epsilon: 0.2, rho_a: 0.2}
+"""
+
 # any plan of the two-state system in a box
 FAMILY_TWO = """
 tubecert: 1

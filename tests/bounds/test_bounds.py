@@ -6,6 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from balls import exactly as q
+from balls import prove
 from flint import arb, ctx
 from systems import (
     TWO,
@@ -431,28 +433,6 @@ def test_permuted_states_have_the_same_constants(three):
         assert constant.below <= changed.above * (1 + 1e-12)
 
 
-def prove(box, settled, budget):
-    """Bisection in ball arithmetic until every part is settled."""
-    stack, count = [box], 0
-    while stack:
-        part = stack.pop()
-        count += 1
-        assert count < budget, "the independent proof ran out of boxes"
-        if settled([arb(float(lo + hi) / 2, float(hi - lo) / 2 * (1 + 1e-12)) for lo, hi in part]):
-            continue
-        k = max(range(len(part)), key=lambda i: part[i][1] - part[i][0])
-        middle = sum(part[k]) / 2
-        stack += [
-            [*part[:k], (part[k][0], middle), *part[k + 1 :]],
-            [*part[:k], (middle, part[k][1]), *part[k + 1 :]],
-        ]
-
-
-def q(text):
-    fraction = Fraction(text)
-    return arb(fraction.numerator) / fraction.denominator
-
-
 @pytest.mark.slow
 def test_the_drift_is_bounded_in_ball_arithmetic_too(three):
     suprema, constants, _, _ = three
@@ -465,7 +445,7 @@ def test_the_drift_is_bounded_in_ball_arithmetic_too(three):
         f = three_forms(x, q)["f"]
         return bool(f[0] ** 2 + f[1] ** 2 + f[2] ** 2 < bound**2)
 
-    half = suprema.rho * 1.0001
+    half = Fraction(suprema.rho * 1.0001)
     prove([(-half, half)] * 3, settled, 20_000)
 
 
@@ -482,8 +462,8 @@ def test_the_drift_along_a_moving_plan_is_bounded_in_ball_arithmetic_too(two):
         u = 3 * t.sin()
         return bool((f[0] + q("0.5") * u) ** 2 + (f[1] - 2 * u) ** 2 < bound**2)
 
-    half = RHO_TWO * 1.0001
-    prove([(0.0, 5.0), (-half, half), (-half, half)], settled, 40_000)
+    half = Fraction(RHO_TWO * 1.0001)
+    prove([(Fraction(0), Fraction(5)), (-half, half), (-half, half)], settled, 40_000)
 
 
 # -- mutations: each makes a check above fail ----------------------------------------------------------------

@@ -61,15 +61,21 @@ parts = st.fixed_dictionaries(
 )
 
 
+def assert_expanded(matrices, box, part, *order):
+    """The expansion on a box contains what it is of, at a point inside."""
+    function = MatrixFunction([[[read(t) for t in row] for row in m] for m in matrices], *order)
+    ends = {name: (lo, lo + width) for name, (lo, width) in box.items()}
+    inner = {n: Fraction(lo) + part[n] * (Fraction(hi) - Fraction(lo)) for n, (lo, hi) in ends.items()}
+    assert_contains(matrices, function, ends, inner)
+    return function
+
+
 @pytest.mark.slow
 @given(several=st.lists(texts(leaves=5), min_size=4, max_size=4), box=boxes, part=parts)
 @SETTINGS
 def test_expansions_contain_the_function(several, box, part):
     matrices = [[several[:2], several[2:]], [[several[0]], [several[3]]]]
-    function = MatrixFunction([[[read(t) for t in row] for row in m] for m in matrices])
-    ends = {name: (lo, lo + width) for name, (lo, width) in box.items()}
-    inner = {n: Fraction(lo) + part[n] * (Fraction(hi) - Fraction(lo)) for n, (lo, hi) in ends.items()}
-    assert_contains(matrices, function, ends, inner)
+    assert_expanded(matrices, box, part)
 
 
 KINKS = ["abs(x)", "norm(x, y)", "x*norm(x, 2*y)**2", "abs(x - y) + y**2", "exp(abs(x))*norm(x, y, 1/2)"]
@@ -81,11 +87,8 @@ KINKS = ["abs(x)", "norm(x, y)", "x*norm(x, 2*y)**2", "abs(x - y) + y**2", "exp(
 @settings(max_examples=30, deadline=None)
 def test_expansions_of_kinks_and_their_gradients_contain_them(text, box, part):
     matrices = [[[text, "x*y"]]]
-    function = MatrixFunction([[[read(t) for t in row] for row in m] for m in matrices])
+    function = assert_expanded(matrices, box, part)
     assert function._order == 1
-    ends = {name: (lo, lo + width) for name, (lo, width) in box.items()}
-    inner = {n: Fraction(lo) + part[n] * (Fraction(hi) - Fraction(lo)) for n, (lo, hi) in ends.items()}
-    assert_contains(matrices, function, ends, inner)
     gradient = MatrixFunction([[derivatives([read(text)], "x")]])
     assert gradient._order == 0
 
@@ -94,11 +97,7 @@ def test_expansions_of_kinks_and_their_gradients_contain_them(text, box, part):
 @given(several=st.lists(texts(leaves=5), min_size=2, max_size=2), box=boxes, part=parts)
 @settings(max_examples=25, deadline=None)
 def test_lower_orders_contain_too(order, several, box, part):
-    matrices = [[several]]
-    function = MatrixFunction([[[read(t) for t in row] for row in m] for m in matrices], order)
-    ends = {name: (lo, lo + width) for name, (lo, width) in box.items()}
-    inner = {n: Fraction(lo) + part[n] * (Fraction(hi) - Fraction(lo)) for n, (lo, hi) in ends.items()}
-    assert_contains(matrices, function, ends, inner)
+    assert_expanded([[several]], box, part, order)
 
 
 def overestimates(e, widths, order=2, names=("x", "y")):

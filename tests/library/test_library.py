@@ -17,7 +17,7 @@ import yaml
 from commands import run
 from hypothesis import given
 from hypothesis import strategies as st
-from systems import SCALAR
+from systems import FLAT, SCALAR
 from texts import ROOT
 
 import tubecert as tc
@@ -26,17 +26,7 @@ from tubecert.letters import NAMES
 from tubecert.pipeline.counting import claims_of
 
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
-TEXT = """
-tubecert: 1
-name: cart
-system: {states: [p, v], inputs: [u], units: {p: m<b>, v: m/s}, f: [v, "-p - v"], B: [[0], [1]]}
-safe_set: {p: [-2, 2], v: [-2, 2]}
-uncertainty: {h: ["0.2*sin(t)"]}
-trajectory: {kind: equilibrium, at: [0, 0], horizon: 4}
-initial_state: {at: [0.05, 0]}
-metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
-tube: {epsilon: 0.2, rho_a: 0.2}
-"""
+TEXT = FLAT.replace("name: flat", "name: cart").replace("[u],", "[u], units: {p: m<b>, v: m/s},")
 DATA = {key: value for key, value in yaml.safe_load(TEXT).items() if key != "tubecert"}
 
 

@@ -7,6 +7,8 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 import scipy.linalg
+from balls import exactly as q
+from balls import prove
 from flint import arb, ctx
 from systems import (
     BOX_THREE,
@@ -150,36 +152,6 @@ def test_the_five_digit_two_state_metric_is_certified():
     assert proof.largest_rate.below == pytest.approx(1.74358, abs=2e-5)
     assert proof.lower_on_set.above == pytest.approx(0.20086, abs=1e-5)
     assert proof.upper_on_set.above == pytest.approx(0.32823, abs=1e-5)
-
-
-def balls_of(box):
-    def radius(width):
-        return arb(0, float(width / 2) * (1 + 1e-12) + 1e-300)
-
-    return [arb((lo + hi).numerator, 0) / (2 * (lo + hi).denominator) + radius(hi - lo) for lo, hi in box]
-
-
-def prove(box, holds, budget):
-    """Whether `holds` (on boxes of balls) is proven everywhere by bisection of the widest side."""
-    stack, count = [box], 0
-    while stack:
-        part = stack.pop()
-        count += 1
-        assert count < budget, "the independent proof ran out of boxes"
-        if holds(balls_of(part)):
-            continue
-        k = max(range(len(part)), key=lambda i: part[i][1] - part[i][0])
-        middle = sum(part[k]) / 2
-        stack += [
-            [*part[:k], (part[k][0], middle), *part[k + 1 :]],
-            [*part[:k], (middle, part[k][1]), *part[k + 1 :]],
-        ]
-    return count
-
-
-def q(text):
-    fraction = Fraction(text)
-    return arb(fraction.numerator) / fraction.denominator
 
 
 @pytest.mark.slow
