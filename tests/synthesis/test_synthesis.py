@@ -260,8 +260,6 @@ def test_an_infeasible_answer_marked_optimal_is_rejected_with_its_reason():
         kappa=1.0,
         feasible=True,
         status="optimal",
-        seconds=0.0,
-        solver_seconds=0.0,
     )
     outcome = shortest_proven(problem, lie, Fraction(2), Effort())
     assert isinstance(outcome, Rejected)

@@ -16,7 +16,6 @@ Untrusted. Implements: (CCM_1), (CCM_2) at points.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -176,10 +175,9 @@ class _EndedError(Exception):
 
 
 class _Synthesis:
-    """The state of one run: the conditions, the bound, the best metric so far, and the clock."""
+    """The state of one run: the conditions, the bound, and the best metric so far."""
 
     def __init__(self, problem: SynthesisProblem) -> None:
-        self.began = time.perf_counter()
         self.problem = problem
         self.forms = FormsTape(problem.model, problem.family, problem.scaled)
         lo, hi = floats(problem.safe_set)
@@ -195,7 +193,7 @@ class _Synthesis:
         self.gap = _FINE if self.unknowns.count <= _CHEAP else _GAP
         self.gap = min(self.gap, _SHARP) if problem.sharp else self.gap
         self.limit = min(problem.limit or _HOPELESS, _HOPELESS)
-        self.bound, self.solver_seconds, self.rounds = 0.0, 0.0, 0
+        self.bound, self.rounds = 0.0, 0
         self.extreme: Array | None = None  # the unknowns of least kappa
         self.best: tuple[float, Array] | None = None  # kappa and V_k
         self.program = self._start()
@@ -231,8 +229,6 @@ class _Synthesis:
             feasible=feasible,
             status=status,
             rounds=self.rounds,
-            seconds=time.perf_counter() - self.began,
-            solver_seconds=self.solver_seconds,
         )
 
     # -- solving -----------------------------------------------------------------------------------------------
@@ -247,7 +243,7 @@ class _Synthesis:
 
     def _least(self) -> Array:
         """The unknowns of least kappa; raises the bound, or `_EndedError` if there is none."""
-        least = self._count(self.program.least_kappa())
+        least = self.program.least_kappa()
         if least.values is None or not least.feasible:
             raise _EndedError(least.feasible, least.status)
         kappa = float(least.values[-1])
@@ -260,14 +256,10 @@ class _Synthesis:
 
     def _central(self, reference: Array) -> Array | None:
         """The unknowns in the middle of what is feasible slightly above the bound; None if nothing is."""
-        found = self._count(self.program.central(self.bound * (1 + self.gap), self.gap / 4, reference))
+        found = self.program.central(self.bound * (1 + self.gap), self.gap / 4, reference)
         if found.values is None or not found.feasible or not found.values[-1] > 0:
             return None
         return found.values[:-1]
-
-    def _count(self, solution: ConicSolution) -> ConicSolution:
-        self.solver_seconds += solution.seconds
-        return solution
 
     # -- conditions --------------------------------------------------------------------------------------------
 

@@ -5,10 +5,8 @@ sparse and nothing is canonicalised, so that the wall time is the solver's own. 
 settings; SCS, for cross-checks, and every other solver are reached through cvxpy.
 Untrusted: what comes back is a proposal with an opinion, never a verdict.
 
-Every other solver of semidefinite programs is reached through cvxpy, by the name that it has there: the same
-program, one constraint of cvxpy for each of its parts. What a solver says of its work comes back
-as its status: its warnings are not repeated, its breakdowns are no solution.
-Untrusted, like every solver.
+A program for cvxpy has one constraint for each of its parts. What a solver says of its work comes back as its status:
+its warnings are not repeated, its breakdowns are no solution.
 """
 
 from __future__ import annotations
@@ -82,8 +80,6 @@ class ConicSolution:
     feasible: bool | None
     finished: bool
     status: str
-    iterations: int
-    seconds: float
 
     @classmethod
     def none(cls, status: str) -> ConicSolution:
@@ -95,8 +91,6 @@ class ConicSolution:
             feasible=None,
             finished=False,
             status=status,
-            iterations=0,
-            seconds=0.0,
         )
 
 
@@ -194,8 +188,6 @@ def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations:
         feasible=opinions.get(name),
         finished=name in ("Solved", "PrimalInfeasible"),
         status=f"Clarabel: {_words(name)}",
-        iterations=int(found.iterations),
-        seconds=float(found.solve_time),
     )
 
 
@@ -333,7 +325,7 @@ def _bound(parts: list[tuple[str, Affine]], constraints: list[Any]) -> float | N
 
 def _answer(task: Any, y: Any, name: str, bound: float | None, tolerance: float) -> ConicSolution:
     cvxpy = _cvxpy()
-    status, stats = str(task.status), task.solver_stats
+    status = str(task.status)
     opinions = {
         cvxpy.OPTIMAL: True,
         cvxpy.OPTIMAL_INACCURATE: True,
@@ -351,6 +343,4 @@ def _answer(task: Any, y: Any, name: str, bound: float | None, tolerance: float)
         feasible=opinions.get(status),
         finished=status in (cvxpy.OPTIMAL, cvxpy.INFEASIBLE),
         status=f"{name} through cvxpy: {status.replace('_', ' ')}",
-        iterations=int(getattr(stats, "num_iters", None) or 0),
-        seconds=float(getattr(stats, "solve_time", None) or 0.0),
     )

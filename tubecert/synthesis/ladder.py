@@ -6,7 +6,6 @@ is kept, so that a failure can say what was tried.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -67,8 +66,6 @@ class Attempt:
     outcome: Outcome
     condition_number: float | None = None
     undecided: bool = False
-    seconds: float
-    solver_seconds: float
 
 
 def attempted(
@@ -76,7 +73,6 @@ def attempted(
     rate: Fraction,
     proposal: Proposal,
     outcome: VerifiedMetric | Rejected,
-    seconds: float,
 ) -> Attempt:
     """What became of a proposal, to be told."""
     proven = outcome if isinstance(outcome, VerifiedMetric) else None
@@ -88,8 +84,6 @@ def attempted(
         outcome=outcome.outcome if isinstance(outcome, Rejected) else Proven(),
         condition_number=None if proven is None else proven.condition_number.above,
         undecided=isinstance(outcome, Rejected) and outcome.undecided,
-        seconds=seconds,
-        solver_seconds=proposal.solver_seconds,
     )
 
 
@@ -101,7 +95,6 @@ def kappa(metric: VerifiedMetric) -> float:
 
 def guarded(name: str, route: Route, problem: SynthesisProblem) -> Proposal:
     """What a route proposes; a solver that breaks down has proposed nothing."""
-    started = time.perf_counter()
     try:
         return route(problem)
     except (ArithmeticError, ValueError, RuntimeError) as error:
@@ -112,8 +105,6 @@ def guarded(name: str, route: Route, problem: SynthesisProblem) -> Proposal:
             kappa=float("inf"),
             feasible=None,
             status=f"broke down ({what})",
-            seconds=time.perf_counter() - started,
-            solver_seconds=0.0,
         )
 
 
@@ -289,15 +280,11 @@ class Ladder:
         degree = best.family.degree
         for back_off in _BACK_OFF[1:]:
             problem = replace(self._problem(best.rate, best.floor, degree, back_off), sharp=True)
-            started = time.perf_counter()
             proposal = guarded(name, route, problem)
             self.rounds += proposal.rounds
             if not proposal.kappa < _POLISHES * kappa(best):
                 break
-            outcome = shortest_proven(problem, proposal, best.rate, effort, self.request.proofs)
-            self._note(
-                attempted(problem, best.rate, proposal, outcome, time.perf_counter() - started), outcome
-            )
+            outcome = self._judged(problem, proposal, best.rate, effort)
             if isinstance(outcome, Rejected):
                 break
             best = min(best, outcome, key=kappa)
@@ -336,11 +323,9 @@ class Ladder:
         while back_offs and self.rounds != self.request.rounds:
             back_off = back_offs.pop(0)
             problem = self._problem(rate, floor, degree, back_off)
-            started = time.perf_counter()
             proposal = guarded(name, route, problem)
             self.rounds += proposal.rounds
-            outcome = shortest_proven(problem, proposal, rate, self.request.effort, self.request.proofs)
-            self._note(attempted(problem, rate, proposal, outcome, time.perf_counter() - started), outcome)
+            outcome = self._judged(problem, proposal, rate, self.request.effort)
             if isinstance(outcome, VerifiedMetric):
                 if retreated and self.request.coordinates == "auto":
                     self._wider[degree] = (
@@ -383,7 +368,12 @@ class Ladder:
             )
         return self._families[degree]
 
-    def _note(self, attempt: Attempt, outcome: VerifiedMetric | Rejected) -> None:
+    def _judged(
+        self, problem: SynthesisProblem, proposal: Proposal, rate: Fraction, effort: Effort
+    ) -> VerifiedMetric | Rejected:
+        """What the proof makes of a proposal, which is kept and told."""
+        outcome = shortest_proven(problem, proposal, rate, effort, self.request.proofs)
+        attempt = attempted(problem, rate, proposal, outcome)
         self.attempts.append(attempt)
         if isinstance(outcome, VerifiedMetric):
             self.proven.append(outcome)
@@ -393,6 +383,7 @@ class Ladder:
             self.request.progress(
                 Step(phase=Phase.SYNTHESIS, name=f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")
             )
+        return outcome
 
 
 def _largest(works: Callable[[Fraction], bool]) -> Fraction | None:

@@ -81,8 +81,7 @@ def polynomial_conditions(
     points, weight = _points(charts[0], model, box)
     at = forms(points, np.zeros((len(points), len(box), 0)))
     own = [(sign, sign) for sign in symmetries]
-    unit = _unit(problem, at.frame, mask[0])
-    for name, values in _bounds(at.metric_rows(unknowns), unit, at.input, problem.floor):
+    for name, values in _bounds(at.metric_rows(unknowns), at.input, problem.floor):
         found += _placed(name, charts[0], values * weight[:, None, None], own, model=model, pieces=pieces)
     if N[0]:
         points, weight = _points(charts[1], model, box)
@@ -166,22 +165,10 @@ def _points(chart: Chart, model: ControlAffineModel, box: Array) -> tuple[Array,
     return points, weight
 
 
-def _unit(problem: SynthesisProblem, frame: Array, mask: NDArray[np.bool_]) -> Array:
-    """What W is measured in at the points of a frame (N, n, n): I, or E T E' of a target, as far as its signs allow.
-
-    `mask` (n, n) are the entries, i <= j, that symmetries leave to a constant V.
-    """
-    n = frame.shape[1]
-    if problem.target is None:
-        return np.broadcast_to(np.eye(n), frame.shape)
-    target = np.where(mask | mask.T, problem.target, 0.0) / problem.scaled.entries[0]
-    return np.asarray(frame @ target @ frame.swapaxes(1, 2))
-
-
-def _bounds(W: Array, unit: Array, BBt: Array, floor: str) -> Iterator[tuple[str, Array]]:
-    """Floors and the ceiling of W, from its rows (N, t, U), as (N, t, U + 2); `unit` and BBt are (N, n, n)."""
+def _bounds(W: Array, BBt: Array, floor: str) -> Iterator[tuple[str, Array]]:
+    """Floors and the ceiling of W, from its rows (N, t, U), as (N, t, U + 2); BBt is (N, n, n)."""
     i, j = triangle(BBt.shape[1])
-    eye = unit[:, i, j]
+    eye = np.broadcast_to(np.where(i == j, 1.0, 0.0), W.shape[:2])
     none = np.zeros_like(eye)
     if floor == "input":
         yield "floor", _joined(W, none, -BBt[:, i, j])

@@ -25,8 +25,6 @@ class SynthesisProblem:
       measured by its size in these coordinates;
     - N'(-d_f W + f_x W + W f_x' + 2 rate W)N <= 0, N = B_perp(x); `rate` in 1/s, any margin included.
 
-    With a `target` T (n, n), in the states' own units, E T E' takes the place of I, E being the family's frame: W is to
-    be as near to it as the conditions permit, kappa says how near, and 1 is equality. Only sums of squares know of it.
 
     I is meant in the `coordinates`, which are made of the `half_widths` (without any, of those of the safe set). W and
     the rate of `model` are not used. Above `limit` the answer is of no use, and after so many `rounds` none is asked
@@ -42,7 +40,6 @@ class SynthesisProblem:
     solver: str = "clarabel"
     coordinates: Choice = "identity"
     half_widths: tuple[Fraction, ...] = ()
-    target: Array | None = field(default=None, repr=False, compare=False)
     rounds: int | None = None
     sharp: bool = False
     progress: Progress | None = field(default=None, repr=False)
@@ -63,7 +60,7 @@ class Proposal:
 
     `coefficients`: V_k as floats, (K, n, n), None if there are none; `kappa`: what the route claims; `bound`: a bound
     of kappa from below for this family as far as the solver may be trusted; `feasible`: the solver's opinion, None if
-    it has none; `status`: its words; `seconds` of all, `solver_seconds` of the solver's own.
+    it has none; `status`: its words.
     """
 
     route: str
@@ -73,8 +70,6 @@ class Proposal:
     feasible: bool | None
     status: str
     rounds: int = 1
-    seconds: float
-    solver_seconds: float
 
 
 # the largest that was seen to end has nine states, of which three move; a chain of ten, one that moves

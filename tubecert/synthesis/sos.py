@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 from math import inf, prod
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -139,16 +138,15 @@ _DUST = 1e-11  # relative to the largest coefficient
 
 def propose_sos(problem: SynthesisProblem) -> Proposal:
     """The member of the family with the least kappa that sums of squares find."""
-    start = perf_counter()
     try:
         conditions = polynomial_conditions(problem)
     except (NotPolynomialError, NotLiftedError) as error:
-        return _proposal(None, ConicSolution.none(f"sums of squares do not apply: {error}"), problem, start)
+        return _proposal(None, ConicSolution.none(f"sums of squares do not apply: {error}"), problem)
     if problem.progress is not None:
         words = f"sums of squares: {len(conditions.conditions)} polynomial matrices"
         problem.progress(Step(phase=Phase.SYNTHESIS, name=words))
     found = solve(sos_program(conditions), problem.solver)
-    return _proposal(conditions, found, problem, start)
+    return _proposal(conditions, found, problem)
 
 
 def sos_program(conditions: Conditions) -> ConicProgram:
@@ -186,9 +184,7 @@ def _clean(condition: Condition) -> Array:
     return np.where(np.abs(table) > _DUST * np.abs(table).max(), table, 0.0)
 
 
-def _proposal(
-    conditions: Conditions | None, found: ConicSolution, problem: SynthesisProblem, start: float
-) -> Proposal:
+def _proposal(conditions: Conditions | None, found: ConicSolution, problem: SynthesisProblem) -> Proposal:
     y, kappa, status, feasible = found.values, inf, found.status, found.feasible
     if conditions is None or feasible is False:
         y = None
@@ -207,6 +203,4 @@ def _proposal(
         kappa=kappa,
         feasible=feasible,
         status=status,
-        seconds=perf_counter() - start,
-        solver_seconds=found.seconds,
     )
