@@ -23,7 +23,7 @@ import numpy as np
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.domain import Range
 from tubecert.findings import Finding, Severity
-from tubecert.lint.codes import LEFT_OUT
+from tubecert.lint.codes import LEFT_OUT, finding
 from tubecert.lint.metric import metric_findings, reach_findings
 from tubecert.lint.names import name_findings
 from tubecert.lint.plan import plan_findings
@@ -64,8 +64,6 @@ def _left_out(spec: Spec) -> list[Finding]:
             if name in named
         }
     return [
-        Finding(
-            code=LEFT_OUT, message=message, severity=Severity.NOTE, location=spec.location(key), help=help
-        )
+        finding(spec, LEFT_OUT, key, message, help, severity=Severity.NOTE)
         for key, (message, help) in told.items()
     ]

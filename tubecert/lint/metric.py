@@ -71,9 +71,8 @@ def _at(spec: Spec, point: Array) -> str:
 
 
 def _indefinite(spec: Spec, point: Array, lowest: float) -> Finding:
-    message = (
-        f"W is not positive definite: its smallest eigenvalue is {near(lowest, 3)} at {_at(spec, point)}"
-    )
+    found = f"its smallest eigenvalue is {near(lowest, 3)} at {_at(spec, point)}"
+    message = f"W is not positive definite: {found}"
     help = "give another dual metric, or shrink the safe set"
     return finding(spec, codes.INDEFINITE, "metric.dual_metric", message, help, severity=Severity.ERROR)
 
@@ -138,28 +137,18 @@ def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:
     least, most = 1 / values[:, -1], 1 / values[:, 0]
     i, k = int(np.argmin(least)), int(np.argmax(most))
     lower, upper = nearest(metric.lower), nearest(metric.upper)
+    help = "declare what holds, or remove metric.bounds: they are derived"
     for name, declared, found, at, broken, loose in (
-        ("lower", lower, least[i], i, least[i] < lower * (1 - _ROUNDING), False),
-        ("upper", upper, most[k], k, most[k] > upper * (1 + _ROUNDING), False),
-        ("lower", lower, least[i], i, False, lower * _LOOSE < least[i]),
-        ("upper", upper, most[k], k, False, upper > _LOOSE * most[k]),
+        ("lower", lower, least[i], i, least[i] < lower * (1 - _ROUNDING), lower * _LOOSE < least[i]),
+        ("upper", upper, most[k], k, most[k] > upper * (1 + _ROUNDING), upper > _LOOSE * most[k]),
     ):
-        if broken or loose:
-            message = (
-                f"{name} is declared as {near(declared)}, but an eigenvalue of M is {near(found, 4)} at "
-                f"{_at(spec, points[at])}"
-                if broken
-                else f"{name} is declared as {near(declared)}, but about {near(found, 3)} would do"
-            )
-            help = "declare what holds, or remove metric.bounds: they are derived"
-            yield finding(
-                spec,
-                codes.BROKEN_METRIC_BOUND if broken else codes.LOOSE_METRIC_BOUND,
-                f"metric.bounds.{name}",
-                message,
-                help,
-                severity=Severity.ERROR if broken else Severity.WARNING,
-            )
+        path, told = f"metric.bounds.{name}", f"{name} is declared as {near(declared)}, but"
+        if broken:
+            message = f"{told} an eigenvalue of M is {near(found, 4)} at {_at(spec, points[at])}"
+            yield finding(spec, codes.BROKEN_METRIC_BOUND, path, message, help, severity=Severity.ERROR)
+        elif loose:
+            message = f"{told} about {near(found, 3)} would do"
+            yield finding(spec, codes.LOOSE_METRIC_BOUND, path, message, help)
 
 
 def reach_findings(spec: Spec) -> list[Finding]:

@@ -24,7 +24,7 @@ from tubecert.lint.names import turned
 from tubecert.lint.room import least_radius, room_findings
 from tubecert.lint.table import paid, table_findings
 from tubecert.model import TIME, ControlAffineModel, build
-from tubecert.spec import Obstacle, Spec, Vector
+from tubecert.spec import Obstacle, Spec
 from tubecert.spec.trim import Plant, equilibrium
 
 _SAMPLES = 257
@@ -217,7 +217,7 @@ def _obstacles(spec: Spec, curve: Curve) -> Iterator[Finding]:
             message = "the obstacle lies outside the safe set"
             help = "a tube in the safe set cannot meet it"
             yield finding(spec, codes.OBSTACLE_OUTSIDE, path, message, help, severity=Severity.NOTE)
-        hit = next((t for t, x in zip(curve.t, curve.x, strict=True) if _covers(obstacle, x[i], x[k])), None)
+        hit = next((t for t, x in zip(curve.t, curve.x, strict=True) if obstacle.contains(x[i], x[k])), None)
         if hit is not None:
             message = f"the plan meets the obstacle at t = {near(hit, 4)} s"
             help = "plan around it: no tube around this plan keeps away from the obstacle"
@@ -226,36 +226,13 @@ def _obstacles(spec: Spec, curve: Curve) -> Iterator[Finding]:
 
 def _apart(obstacle: Obstacle, first: tuple[Fraction, Fraction], second: tuple[Fraction, Fraction]) -> bool:
     """Whether the obstacle's bounding box and the safe set have no point in common (exact)."""
-    for axis, (low, high) in enumerate((first, second)):
-        least, most = _extent(obstacle, axis)
-        if most < low or least > high:
-            return True
-    return False
+    extents = (_extent(obstacle, axis) for axis in (0, 1))
+    pairs = zip(extents, (first, second), strict=True)
+    return any(most < low or least > high for (least, most), (low, high) in pairs)
 
 
 def _extent(obstacle: Obstacle, axis: int) -> tuple[Fraction, Fraction]:
     if obstacle.radius is not None:
-        assert obstacle.center is not None
         return obstacle.center[axis] - obstacle.radius, obstacle.center[axis] + obstacle.radius
-    values = [corner[axis] for corner in _corners(obstacle)]
+    values = [corner[axis] for corner in obstacle.polygon]
     return min(values), max(values)
-
-
-def _corners(obstacle: Obstacle) -> tuple[Vector, ...]:
-    assert obstacle.polygon is not None
-    return obstacle.polygon
-
-
-def _covers(obstacle: Obstacle, x: float, y: float) -> bool:
-    """Whether a point lies in the obstacle (floats)."""
-    if obstacle.radius is not None:
-        assert obstacle.center is not None
-        return math.hypot(x - nearest(obstacle.center[0]), y - nearest(obstacle.center[1])) < nearest(
-            obstacle.radius
-        )
-    corners = [(nearest(a), nearest(b)) for a, b in _corners(obstacle)]
-    inside = False
-    for (a, b), (c, d) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if (b > y) != (d > y) and x < a + (y - b) * (c - a) / (d - b):
-            inside = not inside
-    return inside

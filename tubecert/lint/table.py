@@ -39,6 +39,15 @@ class _Points:
     u: Array
     between: Array | None = None
 
+    def exchanged(self, i: int, j: int, *, inputs: bool) -> _Points:
+        """The same with two columns of states, or of inputs, in each other's place."""
+        columns = list(range((self.u if inputs else self.x).shape[1]))
+        columns[i], columns[j] = j, i
+        if not inputs:
+            return replace(self, x=self.x[:, columns])
+        between = None if self.between is None else self.between[:, columns]
+        return replace(self, u=self.u[:, columns], between=between)
+
 
 class _Dynamics:
     """f + B u of a plan, and how far pieces are from it."""
@@ -142,9 +151,9 @@ def _exchanged(
 ) -> Finding | None:
     """Two columns of states, or of inputs, that are exchanged."""
     tried = [
-        (float(dynamics.defect(exchange(points, pair)).max()), names[pair[0]], names[pair[1]])
-        for names, exchange in ((spec.states, _states), (spec.inputs, _inputs))
-        for pair in combinations(range(len(names)), 2)
+        (float(dynamics.defect(points.exchanged(i, j, inputs=inputs)).max()), names[i], names[j])
+        for names, inputs in ((spec.states, False), (spec.inputs, True))
+        for i, j in combinations(range(len(names)), 2)
     ]
     other, one, another = min(tried, default=(worst, "", ""))
     if not other < _FALLS * worst:
@@ -156,22 +165,6 @@ def _exchanged(
         table.header,
         "exchange the two names in the first line",
     )
-
-
-def _states(points: _Points, pair: tuple[int, int]) -> _Points:
-    return replace(points, x=_swapped(points.x, pair))
-
-
-def _inputs(points: _Points, pair: tuple[int, int]) -> _Points:
-    between = None if points.between is None else _swapped(points.between, pair)
-    return replace(points, u=_swapped(points.u, pair), between=between)
-
-
-def _swapped(rows: Array, pair: tuple[int, int]) -> Array:
-    columns = list(range(rows.shape[1]))
-    i, j = pair
-    columns[i], columns[j] = j, i
-    return rows[:, columns]
 
 
 def _rows_apart(size: Array) -> list[int]:

@@ -32,11 +32,6 @@ def boundary(test: Callable[[Array], Mask], good: Array, bad: Array, rounds: int
     return good
 
 
-def boundary_log(test: Callable[[Array], Mask], good: Array, bad: Array, rounds: int = 13) -> Array:
-    """The same for positive numbers, in logarithms."""
-    return np.exp(boundary(lambda u: test(np.exp(u)), np.log(good), np.log(bad), rounds))
-
-
 def smallest(test: Callable[[Array], Mask], low: float, high: float, points: int = 120) -> float:
     """The smallest x in [low, high] from which on `test` holds, or inf; scans, then refines in logarithms."""
     grid = np.geomspace(low, high, points)
@@ -47,19 +42,8 @@ def smallest(test: Callable[[Array], Mask], low: float, high: float, points: int
     if failing.size == 0:
         return low
     first = int(failing[-1])
-    return float(boundary_log(test, grid[[first + 1]], grid[[first]])[0])
-
-
-def largest(
-    test: Callable[[Array], Mask], low: Array, high: Array, points: int = 120, rounds: int = 13
-) -> Array:
-    """The largest x in [low, high] that passes, per lane; 0 where none does."""
-    grid = np.geomspace(low, high, points)
-    holds = test(grid)
-    lanes = np.arange(grid.shape[1])
-    last = points - 1 - np.argmax(holds[::-1], axis=0)
-    found = boundary_log(test, grid[last, lanes], grid[np.minimum(last + 1, points - 1), lanes], rounds)
-    return np.where(holds.any(axis=0), found, 0.0)
+    u = np.log(grid)
+    return float(np.exp(boundary(lambda own: test(np.exp(own)), u[[first + 1]], u[[first]])[0]))
 
 
 def minimum_log(function: Callable[[Array], Array], low: float, high: float, rounds: int = 6) -> float:

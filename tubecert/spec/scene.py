@@ -142,10 +142,10 @@ class Obstacle:
     def __post_init__(self) -> None:
         assert (len(self.polygon) >= 3) == (self.radius is None)
 
-    def contains(self, x: Fraction, y: Fraction) -> bool:
-        """Whether a point lies in it: exact, for one that is on no edge, by Jordan's lemma for polygons."""
+    def contains(self, x: Fraction | float, y: Fraction | float) -> bool:
+        """Whether a point that is on no edge lies in it, exactly for fractions: by Jordan's lemma for polygons."""
         if self.radius is not None:
-            return (x - self.center[0]) ** 2 + (y - self.center[1]) ** 2 <= self.radius**2
+            return bool((x - self.center[0]) ** 2 + (y - self.center[1]) ** 2 <= self.radius**2)
         inside = False
         for (ax, ay), (bx, by) in zip(self.polygon, (*self.polygon[1:], self.polygon[0]), strict=True):
             if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
@@ -196,13 +196,11 @@ def _plane(field: Field | None, owner: Field, names: Names) -> tuple[str, str] |
 
 def obstacles_data(obstacles: Iterable[Obstacle], spec: Any) -> list[dict[str, Any]]:
     """The canonical form; that one decides goes without saying."""
-    return [_obstacle_data(obstacle, spec) for obstacle in obstacles]
-
-
-def _obstacle_data(own: Obstacle, spec: Any) -> dict[str, Any]:
-    disc = {} if own.radius is None else {"disc": _DISC.written(own, spec)}
-    told = OBSTACLE.written(own, spec)
-    return {name: value for name, value in told.items() if value is not True} | disc
+    found = []
+    for own in obstacles:
+        told = {name: value for name, value in OBSTACLE.written(own, spec).items() if value is not True}
+        found.append(told if own.radius is None else told | {"disc": _DISC.written(own, spec)})
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

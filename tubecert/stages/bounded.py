@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import cached_property
 from math import isfinite
 from typing import TypeVar
 
@@ -63,12 +62,6 @@ class Enclosed:
     def constants(self) -> BoundConstants:
         """Every constant, by name."""
         return self.problem.constants
-
-    @cached_property
-    def closely(self) -> dict[str, dict[str, str]]:
-        """What the constants follow from beside the ground of the tube, as data: gaps of their own."""
-        own = {name: number_text(gap) for name, gap in self.gaps.items()}
-        return {"gaps": own} if own else {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,22 +165,19 @@ def declared_in(coordinates: Coordinates | None, declared: Mapping[str, Constant
 
 def bound(enclosed: Enclosed) -> Bounded | Stopped:
     """The constants, if they are bounded and as declared; then what else is told of the tube."""
-    return unmet(enclosed) or _bounded(enclosed)
+    spec = enclosed.question.spec
+    return unmet(enclosed) or Bounded(
+        enclosed=enclosed,
+        half_widths=half_widths(enclosed),
+        geodesics=_geodesics(enclosed),
+        clearances=tuple(_cleared(enclosed, obstacle) for obstacle in spec.obstacles),
+        inputs=tuple(_limited(enclosed, name, limits) for name, limits in spec.limits),
+    )
 
 
 def unmet(enclosed: Enclosed) -> Stopped | None:
     """What keeps the theorems from being asked at all: a constant without a bound, a declared one that is broken."""
     return _unbounded(enclosed) or _undeclared(enclosed)
-
-
-def _bounded(enclosed: Enclosed) -> Bounded:
-    return Bounded(
-        enclosed=enclosed,
-        half_widths=half_widths(enclosed),
-        geodesics=_geodesics(enclosed),
-        clearances=tuple(_cleared(enclosed, obstacle) for obstacle in enclosed.question.spec.obstacles),
-        inputs=tuple(_limited(enclosed, name, limits) for name, limits in enclosed.question.spec.limits),
-    )
 
 
 def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -> LimitedInput:

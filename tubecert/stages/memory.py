@@ -28,10 +28,6 @@ class Memory:
     most: int | None = None
     proofs: Proofs = field(default_factory=Proofs)
 
-    def knows(self, name: str, depends_on: Json) -> bool:
-        """Whether a value is kept."""
-        return (name, digest(depends_on)) in self.kept
-
     def recall(self, name: str, depends_on: Json, compute: Callable[[], T]) -> T:
         """The value that `compute` gives, which depends on `depends_on` (JSON data) and nothing else."""
         key = name, digest(depends_on)

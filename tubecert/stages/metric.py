@@ -9,7 +9,6 @@ from math import isfinite
 from tubecert.claims.advice import DeclareMetricBound, LowerRate, OtherMetric, RaiseBudget
 from tubecert.claims.family import Relax
 from tubecert.claims.statements import MetricBound, MetricContraction, MetricKilling, RankOfB
-from tubecert.enclosure.branch_and_bound import Decision
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.metric.verify import MetricProof
 from tubecert.model import rank_decision
@@ -41,7 +40,8 @@ def prove_metric(question: Question) -> ProvenMetric | Stopped:
         "rank", _on(question), lambda: rank_decision(model, spec.safe_set, question.effort)
     )
     if rank.verdict is not Verdict.CERTIFIED:
-        return _rank_lost(question, rank)
+        x = tuple(rank.at.get(name, 0.0) for name in model.states)
+        return stopped(question, RankOfB(), rank.verdict, where=Witness(x=x))
     proof = question.memory.recall(
         "metric",
         _on(question),
@@ -63,11 +63,6 @@ def _on(question: Question) -> Json:
     if question.model.time is not None:
         parts["horizon"] = str(question.model.time[1])
     return parts | {"gap": str(question.options.gap), "budget": question.options.budget}
-
-
-def _rank_lost(question: Question, rank: Decision) -> Stopped:
-    x = tuple(rank.at.get(name, 0.0) for name in question.model.states)
-    return stopped(question, RankOfB(), rank.verdict, where=Witness(x=x))
 
 
 def _relax(proof: MetricProof) -> tuple[Relax, ...]:
