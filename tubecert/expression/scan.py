@@ -304,10 +304,9 @@ class _Walk:
         if name in KINKED and not words.kinks:
             raise token.error(
                 f"{name} is only allowed in h",
-                "elsewhere expressions must be differentiable; sqrt(x**2 + c) with c > 0 may serve. v*abs(v) is, as "
-                "drag(v) with tables: {drag: {points: [[-9, -81, 18], [0, 0, 0], [9, 81, 18]], interpolation: "
-                "slopes}} in system: exactly, for v in [-9, 9]; so is abs(v)**3, by [-9, 729, -243], [0, 0, 0], "
-                "[9, 729, 243]",
+                "elsewhere expressions must be differentiable. v*abs(v) is, exactly for v in [-9, 9], as drag(v) with "
+                "tables: {drag: {points: [[-9, -81, 18], [0, 0, 0], [9, 81, 18]], interpolation: slopes}} in system; "
+                "so is abs(v)**3, by [-9, 729, -243], [0, 0, 0], [9, 729, 243]. sqrt(x**2 + c) with c > 0 may serve",
             )
         if name in words.symbols or name in words.tables or name in FUNCTIONS or name == "pi":
             return

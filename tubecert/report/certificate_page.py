@@ -146,7 +146,7 @@ def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator
         blocks=tuple(system(result.spec.effective, to_json(result.overrides))),
     )
     yield Section(key="provenance", title="Provenance", blocks=tuple(provenance(certificate)))
-    again = check_again(result.spec.effective.name, _NOTES)
+    again = check_again(_NOTES)
     yield Section(key="check", title="Check it again", blocks=tuple(again))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -123,16 +122,15 @@ def provenance(certificate: Certificate) -> Iterator[Block]:
     yield Facts.of(facts)
 
 
-def check_again(name: str, notes: str, *more: str) -> Iterator[Block]:
+def check_again(notes: str, *more: str) -> Iterator[Block]:
     """How a stranger convinces himself; `notes` are computed only, `more` follows the command."""
-    file = shlex.quote(f"{name}.certificate.json")
     yield Words(
         text="This page shows a certificate and proves nothing itself. The certificate, a JSON file with the hash "
         "above, is what can be checked: without a solver, in another arithmetic, and against its specification. "
         f"{notes} are its notes: computed, not hashed, not examined by recheck."
     )
     options = ("", " --spec SPEC.yaml", *more)
-    yield Listing(text="\n".join(f"tubecert recheck {file}{option}" for option in options))
+    yield Listing(text="\n".join(f"tubecert recheck CERT.json{option}" for option in options))
     yield Words(
         text="The command above, run again on the same machine with the same versions, gives the same hash; "
         "elsewhere numbers may differ."

@@ -139,7 +139,7 @@ def _inputs(result: Result) -> Iterator[tuple[str, str]]:
         told = f"{ends(*use.range)} {units.get(use.input, '')}".rstrip()
         if use.limits is not None and use.share is not None:
             limits, used = " to ".join(map(near, use.limits)), up(100 * use.share, 3)
-            told += f" of {limits}: {used} % of the room"
+            told += f" of {limits}: {used} % of the way to a limit"
         yield use.input, told
 
 
@@ -181,7 +181,7 @@ def _law(own: Effective) -> Iterator[Listing]:
 
 
 def _again(own: Effective) -> Iterator[Block]:
-    return check_again(own.name, _NOTES, *([] if is_alone(own) else [" --controller FOLDER"]))
+    return check_again(_NOTES, *([] if is_alone(own) else [" --controller FOLDER"]))
 
 
 def _origin(certificate: Certificate) -> Facts:
