@@ -15,7 +15,6 @@ ELSEWHERE = {  # where a format with significant digits stands, and what it make
     "recheck/": "words of its own, shared with nobody",
     "report/comparison.py": "signed differences in percent",
     "report/figures_axes.py": "coordinates of SVG",
-    "report/figures_tube.py": "coordinates of SVG, and a place in short",
     "sweep/grid.py": "decimals of a grid",
     "synthesis/": "decimals of a proposal",
 }

@@ -29,6 +29,7 @@ from tubecert.lint.names import name_findings
 from tubecert.lint.plan import plan_findings
 from tubecert.lint.uncertainty import uncertainty_findings
 from tubecert.spec import Spec
+from tubecert.verdict import Verdict
 
 __all__ = ["lint", "name_findings"]
 
@@ -40,7 +41,7 @@ def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
         if not spec.lacks:  # else it asks about a metric alone
             findings += [*reach_findings(spec), *plan_findings(spec)]
             findings += uncertainty_findings(spec, time, effort)
-    if spec.expect is not None and "refuted" in (spec.expect.verdict, spec.expect.metric):
+    if spec.expect is not None and Verdict.REFUTED in (spec.expect.verdict, spec.expect.metric):
         return [replace(item, severity=Severity.NOTE) for item in findings]
     return findings
 

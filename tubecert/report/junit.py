@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 from tubecert.checking import Checked, Claim
 from tubecert.findings import Finding, Severity
 from tubecert.printable import visible
+from tubecert.verdict import Verdict
 
 PARTS = {
     "TC1": "specification",
@@ -61,7 +62,7 @@ def _claim(suite: ET.Element, result: Checked, claim: Claim, *, failed: bool) ->
     """A case per claim; a claim that is refuted as expected passes."""
     case = _case(suite, result, f"claim: {claim.name}")
     said = f"{claim.verdict}: {claim.message}" if claim.message else claim.verdict
-    if failed and claim.verdict != "certified":
+    if failed and claim.verdict != Verdict.CERTIFIED:
         _failure(case, claim.verdict, claim.message or claim.verdict, [])
     ET.SubElement(case, "system-out").text = _clean(said)
     return case

@@ -10,19 +10,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final, Literal
 
+from tubecert.verdict import Verdict
+
 Kind = Literal["text", "number", "code", "verdict"]
 _KINDS: Final[Mapping[str, Kind]] = {">": "number", "!": "verdict"}
-_ALIKE: Final[Mapping[str, str]] = {
-    "confirmed": "certified",
-    "metric proven": "certified",
-    "not falsified": "certified",
-    "contradicted": "refuted",
-    "falsified": "refuted",
-    "tube left": "refuted",
-    "error": "refuted",
-    "no result": "undecided",
-    "interrupted": "undecided",
-    "warning": "undecided",
+_ALIKE: Final[Mapping[Verdict, Sequence[str]]] = {
+    Verdict.CERTIFIED: ("confirmed", "metric proven", "not falsified"),
+    Verdict.REFUTED: ("contradicted", "falsified", "tube left", "error"),
+    Verdict.UNDECIDED: ("no result", "interrupted", "warning"),
 }
 
 
@@ -190,7 +185,7 @@ class Page:
 
 def look(verdict: str) -> str:
     """Which of certified, refuted and undecided a word looks like; another word has no look."""
-    return _ALIKE.get(verdict, verdict)
+    return next((own for own, words in _ALIKE.items() if verdict in words), verdict)
 
 
 def typeset(text: str) -> str:

@@ -6,7 +6,7 @@ then the last rows of tables, are left to `-v`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -16,6 +16,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from tubecert.report.page import Block, Cell, Facts, Items, Listing, Page, Reason, Table, Words, look
+from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
@@ -24,7 +25,11 @@ _MOST: Final = 15  # lines of a first screen
 _FEWEST: Final = 2  # rows of a table that is cut
 _LABELS: Final = 12  # characters of the names before values
 _FEW, _MANY = 5, 8  # columns of a table whose heads have room, and of one that has little
-_COLORS: Final = {"certified": "green", "refuted": "red", "undecided": "yellow"}
+_COLORS: Final[Mapping[str, str]] = {
+    Verdict.CERTIFIED: "green",
+    Verdict.REFUTED: "red",
+    Verdict.UNDECIDED: "yellow",
+}
 _ASCII: Final = str.maketrans(
     {"ω": "omega", "Γ": "Gamma", "ρ": "rho", "λ": "lambda", "±": "+-", "≤": "<=", "≥": ">=", "…": "..."}
 )
@@ -90,7 +95,7 @@ def _without(facts: tuple[tuple[str, Cell], ...], index: int) -> tuple[tuple[str
 
 def _opening(page: Page, blocks: Sequence[Block]) -> Iterator[RenderableType]:
     yield _led(page, page.claim or page.summary)
-    if page.verdict != "certified" and page.meaning:
+    if page.verdict != Verdict.CERTIFIED and page.meaning:
         yield _indented(_text(page.meaning))
     yield from map(_indented, _shown(blocks))
 
