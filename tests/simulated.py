@@ -91,6 +91,3 @@ def runs(
         "steps": np.ones(N, dtype=int),
     }
     return Runs(**(values | changes))
-
-
-__all__ = ["FLAT", "Failure", "certified", "runs", "setting"]

@@ -23,6 +23,27 @@ hardware: {sample_time: 0.1, delay: 0.04, noise: {x: 0.01}}
 disturbance: {E: [[1]], bound: [0.2]}
 limits: {u: [-3, 3]}
 """
+POINT = "{kind: equilibrium, at: [0], input: [0]}"
+WAVE = "{kind: expressions, x: ['sin(t)'], u: ['cos(t)'], horizon: 7, afterwards: repeat}"
+AT_ONE = {"trajectory": "{kind: equilibrium, at: [1], input: [1]}", "initial_state": "{at: [1]}"}
+RANGE = ", parameters: {p: [0.9, 1.1]}"
+HOME = {
+    "system": "{states: [x], inputs: [u], f: ['0'], B: [[1]]}",
+    "safe_set": "{x: [-5000, 5000]}",
+    "trajectory": POINT,
+    "initial_state": "{at: [0]}",
+    "hardware": "{sample_time: 0.1}",
+}
+
+
+def scalar(f: str = "0", B: str = "1", more: str = "") -> str:
+    """The section `system` of x' = f + B u."""
+    return f"{{states: [x], inputs: [u], f: ['{f}'], B: [['{B}']]{more}}}"
+
+
+def text_of(**sections: str) -> str:
+    """A specification: x' = u at rest, with some sections in place of those at home."""
+    return "tubecert: 1\nname: a\n" + "\n".join(f"{k}: {v}" for k, v in {**HOME, **sections}.items())
 
 
 def result_of(text: str, A: list, B: list, E: list, own: Tables, *, slow: bool = True) -> Result:

@@ -11,6 +11,7 @@ from math import exp, sqrt
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from small_loops import AT_ONE, RANGE, WAVE, scalar, text_of
 
 from tubecert.enclosure.interval import Interval
 from tubecert.model import build
@@ -28,16 +29,7 @@ from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import piecewise_plan
 
 TS = 0.1
-POINT = "{kind: equilibrium, at: [0], input: [0]}"
-WAVE = "{kind: expressions, x: ['sin(t)'], u: ['cos(t)'], horizon: 7, afterwards: repeat}"
 TWICE = "{kind: expressions, x: ['2*sin(t)'], u: ['2*cos(t)'], horizon: 7, afterwards: repeat}"
-HOME = {
-    "system": "{states: [x], inputs: [u], f: ['0'], B: [[1]]}",
-    "safe_set": "{x: [-5000, 5000]}",
-    "trajectory": POINT,
-    "initial_state": "{at: [0]}",
-    "hardware": "{sample_time: 0.1}",
-}
 DOUBLE = {
     "system": "{states: [x, v], inputs: [u], f: [v, '0'], B: [[0], [1]]}",
     "safe_set": "{x: [-5, 5], v: [-5, 5]}",
@@ -45,12 +37,10 @@ DOUBLE = {
     "initial_state": "{at: [0, 0]}",
 }
 OBSERVER = {"N": [[-2 / TS]], "F": [[1]], "G": [[-1 / TS]], "M": [[1]]}  # e_(k+1): what w has changed by
-NEAR = {"hold": "continuous"}
 
 
 def loop_of(*, slow=False, A=((0,),), B=((1,),), E=None, **sections) -> Loop:
-    text = "tubecert: 1\nname: a\n" + "\n".join(f"{k}: {v}" for k, v in {**HOME, **sections}.items())
-    spec = load_text(text)
+    spec = load_text(text_of(**sections))
     model = build(spec)
     plan = plan_of(spec, model)
     E = E if E is not None else [[1.0]] if spec.disturbance else np.zeros((len(A), 0))
@@ -216,14 +206,6 @@ def rho(loop, W, U=0.0, size=()):
     own = Remainders(loop, 64)
     W, U = np.full(loop.states, W, dtype=float), np.full(loop.inputs, U, dtype=float)
     return own.rho(W, U, np.array(size, dtype=float))
-
-
-def scalar(f="0", B="1", more=""):
-    return f"{{states: [x], inputs: [u], f: ['{f}'], B: [['{B}']]{more}}}"
-
-
-AT_ONE = {"trajectory": "{kind: equilibrium, at: [1], input: [1]}", "initial_state": "{at: [1]}"}
-RANGE = ", parameters: {p: [0.9, 1.1]}"
 
 
 @pytest.mark.parametrize(
@@ -454,7 +436,7 @@ def test_a_stage_begins_before_the_plan_ends():
 @pytest.mark.parametrize(("early", "verdict"), [(3, "undecided"), (30, "certified")])
 def test_a_stage_begins_where_its_inequalities_do(early, verdict):
     """x' = -x from 1: e^-3 after 30 samples, and not before."""
-    loop = loop_of(A=[[-1]], system=HOME["system"].replace("'0'", "-x"), initial_state="{at: [1]}")
+    loop = loop_of(A=[[-1]], system=scalar("-x"), initial_state="{at: [1]}")
     own = asked(loop, controller_of(((0,),)), starts=(0, 30), lags=60)
     stages = [
         Stage(start=k, half_widths={"x": Fraction(W)}, deviations={"u": Fraction(1)}, memory=())

@@ -7,6 +7,7 @@ from math import ceil
 import pytest
 from flint import arb, arb_mat
 from sampled_files import CART, SCALAR, changed, made, why_not
+from small_loops import AT_ONE, RANGE, WAVE, scalar, text_of
 
 from tubecert.recheck.cover import CONFIRMED
 from tubecert.recheck.document import Node, read
@@ -20,24 +21,12 @@ from tubecert.recheck.specification import read_sampled_specification
 from tubecert.spec import load_text
 from tubecert.spec.canonical import canonical
 
-WAVE = "{kind: expressions, x: ['sin(t)'], u: ['cos(t)'], horizon: 7, afterwards: repeat}"
-AT_ONE = {"trajectory": "{kind: equilibrium, at: [1], input: [1]}", "initial_state": "{at: [1]}"}
-HOME = {
-    "system": "{states: [x], inputs: [u], f: ['0'], B: [[1]]}",
-    "safe_set": "{x: [-50, 50]}",
-    "trajectory": "{kind: equilibrium, at: [0], input: [0]}",
-    "initial_state": "{at: [0]}",
-    "hardware": "{sample_time: 0.1}",
-}
-
-
-def scalar(f="0", B="1", more=""):
-    return f"{{states: [x], inputs: [u], f: ['{f}'], B: [['{B}']]{more}}}"
+HOME = {"safe_set": "{x: [-50, 50]}"}
 
 
 def asked(**sections):
     """The specification with some sections in place of those at home."""
-    text = "tubecert: 1\nname: a\n" + "\n".join(f"{k}: {v}" for k, v in {**HOME, **sections}.items())
+    text = text_of(**{**HOME, **sections})
     return read_sampled_specification(Node(json.loads(json.dumps(canonical(load_text(text)))), "spec"))
 
 
@@ -79,7 +68,6 @@ def case_of(stages, tables, *, lags=4, ranges=(), **sections) -> Case:
 SILENT = arb_mat(0, 0), arb_mat(0, 1), arb_mat(1, 0), arb_mat([[0]])
 
 
-RANGE = ", parameters: {p: [0.9, 1.1]}"
 BENT = scalar("0", "1 + 0.1*x")
 RESTING = "{kind: equilibrium, at: [0], input: [0], horizon: 4}"
 THROUGH = "{kind: ilqr, start: [0], target: [2], horizon: 2, knots: 3, goal: false}"
