@@ -58,6 +58,14 @@ class MetricProof:
         own, other = ((m.states, m.inputs, m.f, m.time, m.B, m.W, m.rate) for m in (self.model, model))
         return own == other and self.safe_set == safe_set
 
+    def condition_number(self) -> Constant:
+        """sup lmax(M)/inf lmin(M) = sup lmax(W)/inf lmin(W) on the safe set, enclosed, where C1 is proven."""
+        low, high = self.lower_on_set, self.upper_on_set
+        assert low is not None
+        assert high is not None
+        ratio = Interval(high.below, high.above) / Interval(low.below, low.above)
+        return Constant(below=float(ratio.lo), above=float(ratio.hi))
+
 
 def verify_metric(
     model: ControlAffineModel, safe_set: Box, effort: Effort, *, closely: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from math import isfinite, sqrt
@@ -113,13 +113,12 @@ def explain(judged: Judged) -> Explanation:
     told = [reason for key in judged.deciding for reason in reasons(judged.sections[key], explained[key])]
     return Explanation(
         reasons=[*_advised(judged, told), *obstacle_reasons(judged.bounded), *input_reasons(judged)],
-        elasticities={key: _told(each.slopes) for key, each in explained.items() if each.slopes is not None},
+        elasticities={
+            key: {name: slope for name, slope in each.slopes.items() if isfinite(slope)}
+            for key, each in explained.items()
+            if each.slopes is not None
+        },
     )
-
-
-def _told(slopes: Mapping[str, float]) -> dict[str, float]:
-    """What a search says of slopes, as far as it is numbers."""
-    return {name: slope for name, slope in slopes.items() if isfinite(slope)}
 
 
 def _explained(judged: Judged, key: str, proposer: Proposer) -> Explained:

@@ -58,7 +58,7 @@ from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
 from tubecert.stages.options import Options
 from tubecert.stages.question import Question
-from tubecert.synthesis.diagnose import UncontrollableMode, uncontrollable_mode
+from tubecert.synthesis.diagnose import uncontrollable_mode
 from tubecert.synthesis.family import FamilyError
 from tubecert.synthesis.ladder import Ladder, Request, routes
 from tubecert.synthesis.problem import FLOORS, Floor
@@ -137,7 +137,8 @@ class SynthesisRun:
             at = Witness(x=tuple(rank.at.get(name, 0.0) for name in self.model.states)) if rank.at else None
             return self._failed(RankUnproven(), ShrinkSafeSet(), verdict=verdict, at=at)
         rate = self.wanted.rate
-        if rate is not None and (mode := self._limiting_mode(rate)) is not None:
+        points = equilibria(self.spec)
+        if rate is not None and (mode := uncontrollable_mode(self.model, points, rate)) is not None:
             lower = AskForRateBelow(rate=mode.limit) if mode.bound > 0 else GiveInput()
             verdict = Verdict.REFUTED if mode.excludes(rate) else Verdict.UNDECIDED
             at = Witness(x=tuple(map(float, mode.at)))
@@ -198,7 +199,7 @@ class SynthesisRun:
             found = self.ladder.largest_rate(self.limit)
             return found and self.ladder.metric(found.rate)
         if wanted.objective in ("adaptation", "tube"):
-            return self._end_to_end(wanted.objective)
+            return self._end_to_end()
         assert wanted.rate is not None
         found = self.ladder.metric(wanted.rate)
         if found is None or not self._allowed(found):
@@ -221,9 +222,13 @@ class SynthesisRun:
     def _allowed(self, metric: VerifiedMetric) -> bool:
         return self.limit is None or metric.condition_number.above <= self.limit
 
-    def _end_to_end(self, objective: str) -> VerifiedMetric | None:
-        """The metric whose certification comes out best, over rates and over what is bounded from below."""
-        self._certifiable()
+    def _end_to_end(self) -> VerifiedMetric | None:
+        """The metric whose certification comes out best, over rates and over what is bounded from below.
+
+        Raises `SpecError` if the end cannot be judged: what `certify` needs is missing.
+        """
+        if missing := missing_radii(self.spec):
+            raise SpecError(missing)
         if self.wanted.rate is not None:
             self.climb.at(self.wanted.rate)
         else:
@@ -234,12 +239,6 @@ class SynthesisRun:
     def _chosen(self) -> VerifiedMetric | None:
         best = self.climb.best
         return None if best is None else best.metric
-
-    def _certifiable(self) -> None:
-        """Raises `SpecError` if the end cannot be judged: what `certify` needs is missing."""
-        missing = missing_radii(self.spec)
-        if missing:
-            raise SpecError(missing)
 
     def _over_rates(self, last: Fraction) -> None:
         for k in range(_RATES):
@@ -386,10 +385,6 @@ class SynthesisRun:
                     half_widths=widths, bandwidth=best.bandwidth, adaptation_rate=best.adaptation_rate
                 )
         return None
-
-    def _limiting_mode(self, rate: Fraction) -> UncontrollableMode | None:
-        """The mode that leaves nothing above the rate, if there is one."""
-        return uncontrollable_mode(self.model, equilibria(self.spec), rate)
 
     def _say(self, words: str) -> None:
         self._tell(Step(phase=Phase.SYNTHESIS, name=words))

@@ -16,7 +16,6 @@ from tubecert.claims.family import Reason
 from tubecert.claims.statements import MetricContraction, RankOfB
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant, Witness
-from tubecert.enclosure.interval import Interval
 from tubecert.expression import free_symbols
 from tubecert.metric.verify import MetricProof, supported_rate, verify_metric
 from tubecert.model import build, rank_decision
@@ -69,7 +68,6 @@ def verify(spec: Spec, effort: Effort, progress: Progress | None = None) -> Veri
     if proof.lower_on_set is None or proof.upper_on_set is None:
         return replace(known, verdict=proof.verdict, reason=_reason(proof, proof.largest_rate))
     lower, upper = proof.lower_on_set, proof.upper_on_set
-    ratio = Interval(upper.below, upper.above) / Interval(lower.below, lower.above)
     largest = proof.largest_rate
     if largest is None or largest.gap > effort.gap:
         found = supported_rate(model, spec.safe_set, _told(effort, "largest rate", progress))
@@ -79,7 +77,7 @@ def verify(spec: Spec, effort: Effort, progress: Progress | None = None) -> Veri
         verdict=proof.verdict,
         reason=_reason(proof, largest),
         largest_rate=largest.printable() if isfinite(largest.below) else largest,
-        condition_number=Constant(below=float(ratio.lo), above=float(ratio.hi)).printable(),
+        condition_number=proof.condition_number().printable(),
         lower=lower.printable(),
         upper=upper.printable(),
         file=_file(spec, proof),

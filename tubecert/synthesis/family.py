@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import combinations_with_replacement
 from typing import Literal
 
 import numpy as np
@@ -28,11 +27,11 @@ import numpy as np
 from tubecert.claims.failures import Failure, NoFrame, VariableForbidden
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import ONE, ZERO, Expression, cos, free_symbols, sin, symbol, topological
+from tubecert.expression import ZERO, Expression, cos, free_symbols, sin, symbol, topological
 from tubecert.expression.matrix import Matrix, identity, multiply, null_space, transpose
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.frame import commuting_frame, pivot_frame
-from tubecert.synthesis.lifting import unit_angles
+from tubecert.synthesis.lifting import products, unit_angles
 
 
 class FamilyError(ValueError):
@@ -93,7 +92,7 @@ def metric_family(
     generators = [g for form in chosen.values() for g in _generators(form, model)]
     return MetricFamily(
         states=model.states,
-        functions=_monomials(generators, degree),
+        functions=tuple(product for _, product in products(generators, degree)),
         frame=frame,
         variables=tuple(chosen),
         degree=degree if generators else 0,
@@ -148,20 +147,6 @@ def _generators(form: Expression, model: ControlAffineModel) -> list[Expression]
         angle = unit_angles(entries).get(str(form.value), Fraction(1)) * form
         return [sin(angle), cos(angle)]
     return [form]
-
-
-def _monomials(generators: Sequence[Expression], degree: int) -> tuple[Expression, ...]:
-    """All products of at most `degree` generators, 1 first, without squares of sines (sin^2 = 1 - cos^2)."""
-    result = [ONE]
-    for d in range(1, degree + 1):
-        for choice in combinations_with_replacement(generators, d):
-            if any(choice.count(g) > 1 for g in choice if g.op == "sin"):
-                continue
-            product = ONE
-            for g in choice:
-                product = product * g
-            result.append(product)
-    return tuple(result)
 
 
 def _symmetric(a: Matrix) -> Matrix:

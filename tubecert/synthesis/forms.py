@@ -2,14 +2,13 @@
 
 With V = sum_k g_k V_k, A = f_x E - d_f E, P = N'E, Q = N'A (N: orthonormal, B'N = 0) and V's derivative along f in V',
     N'(-d_f W + f_x W + W f_x')N = Q V P' + P V Q' - P V' P'.
-Untrusted: floats propose points and coefficients, `verify` decides. Implements: (CCM_1), (CCM_2) at points.
-
 What mirror symmetries leave of a family, and of the points at which conditions are asked.
 
 D = diag(+-1) with f(Dx) = D f(x), D range B(x) = range B(Dx) and D X = X: with W(x) also D W(Dx) D is feasible, and so
 is their mean. With g_k(Dx) = s_k g_k(x) and E(Dx) = D E(x) diag(c), W is invariant iff V_k has no entry (i, j) with
 s_k c_i c_j = -1. A symmetry under which some g_k or column of E is neither even nor odd is left out.
-Untrusted: seen at random points, and a wrong symmetry can cost a metric but never a proof.
+Untrusted: floats propose points and coefficients, `verify` decides; a symmetry is seen at random points, and a wrong
+one can cost a metric but never a proof. Implements: (CCM_1), (CCM_2) at points.
 """
 
 from __future__ import annotations
@@ -28,6 +27,9 @@ from tubecert.expression.matrix import along, combine, multiply
 from tubecert.model import ControlAffineModel
 from tubecert.synthesis.conic import triangle
 from tubecert.synthesis.family import Coordinates, MetricFamily, unscaled
+
+_CLOSE = 1e-9
+_MOST_STATES = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,9 +201,10 @@ class FormsTape:
             for place, weight in zip(ends, (0.0, 0.5, 1.0), strict=True):
                 place[:, i] = lo[i] + weight * (hi[i] - lo[i])
             given = N / self._scaled.states[:, None]
-            if all(_close(self.projectors(place), N @ _t(N)) for place in ends) and _is_affine(
-                *(_flat(self(place, given)) for place in ends)
-            ):
+            if not all(_close(self.projectors(place), N @ _t(N)) for place in ends):
+                continue
+            low, middle, high = (_flat(self(place, given)) for place in ends)
+            if _close(2 * middle, low + high):
                 found.append(i)
         return tuple(found)
 
@@ -243,12 +246,8 @@ def _flat(forms: PointForms) -> Array:
     return np.concatenate(products, axis=1)
 
 
-def _is_affine(low: Array, middle: Array, high: Array) -> bool:
-    return _close(2 * middle, low + high)
-
-
 def _close(a: Array, b: Array) -> bool:
-    return bool((np.abs(a - b) <= 1e-9 * max(1.0, float(np.abs(b).max(initial=0.0)))).all())
+    return bool((np.abs(a - b) <= _CLOSE * max(1.0, float(np.abs(b).max(initial=0.0)))).all())
 
 
 def _used(entries: Iterable[Expression], model: ControlAffineModel) -> tuple[int, ...]:
@@ -264,10 +263,6 @@ def _symmetric(a: Array) -> Array:
     return np.asarray(0.5 * (a + _t(a)))
 
 
-_CLOSE = 1e-9
-_MOST_STATES = 12
-
-
 def invariant_entries(
     model: ControlAffineModel, family: MetricFamily, box: Array, forms: FormsTape
 ) -> tuple[Array, NDArray[np.bool_]]:
@@ -279,9 +274,9 @@ def invariant_entries(
     drift, here, projectors = _drift(tape, points, forms), forms(points), forms.projectors(points)
     shared = []
     for signs in _candidates(box, forms.variables):
-        if not _same(_drift(tape, points * signs, forms), drift * signs):
+        if not _close(_drift(tape, points * signs, forms), drift * signs):
             continue
-        if not _same(forms.projectors(points * signs), signs[:, None] * projectors * signs):
+        if not _close(forms.projectors(points * signs), signs[:, None] * projectors * signs):
             continue
         there = forms(points * signs)
         parity = _parity(there.values, here.values)
@@ -317,10 +312,6 @@ def _candidates(box: Array, variables: tuple[int, ...]) -> list[Array]:
 def _drift(tape: Tape, points: Array, forms: FormsTape) -> Array:
     """f at points, (N, n), free of units where the forms are."""
     return np.asarray(tape.run_floats(list(points.T), (len(points),)).T / forms.speeds)
-
-
-def _same(a: Array, b: Array) -> bool:
-    return bool((np.abs(a - b) <= _CLOSE * max(1.0, float(np.abs(b).max(initial=0.0)))).all())
 
 
 def _parity(there: Array, here: Array) -> Array | None:

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import combinations_with_replacement
 from random import Random
 
 import numpy as np
@@ -41,7 +40,7 @@ from tubecert.expression.matrix import (
     transpose,
 )
 from tubecert.model import ControlAffineModel, divide
-from tubecert.synthesis.lifting import Lifted, at_point, lift, reduced, unit_angles
+from tubecert.synthesis.lifting import Lifted, at_point, lift, products, reduced, unit_angles
 
 _DEGREE = 5
 _UNKNOWNS = 900
@@ -104,17 +103,8 @@ def _dictionary(model: ControlAffineModel, degree: int) -> list[Expression]:
         for name, row in zip(model.states, model.B, strict=True)
         if any(e is not ZERO for e in row) and symbol(name) not in atoms
     ]
-    result: list[Expression] = []
-    for d in range(degree + 1):
-        for choice in combinations_with_replacement([*atoms, *moved], d):
-            twice = any(choice.count(a) > 1 for a in choice if a.op == "sin")
-            if twice or sum(a in moved for a in choice) > 1:
-                continue
-            product = ONE
-            for a in choice:
-                product = product * a
-            result.append(product)
-    return list(dict.fromkeys(result))
+    found = products([*atoms, *moved], degree)
+    return list(dict.fromkeys(own for choice, own in found if sum(a in moved for a in choice) <= 1))
 
 
 def _solutions(

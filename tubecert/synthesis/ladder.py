@@ -68,25 +68,6 @@ class Attempt:
     undecided: bool = False
 
 
-def attempted(
-    problem: SynthesisProblem,
-    rate: Fraction,
-    proposal: Proposal,
-    outcome: VerifiedMetric | Rejected,
-) -> Attempt:
-    """What became of a proposal, to be told."""
-    proven = outcome if isinstance(outcome, VerifiedMetric) else None
-    return Attempt(
-        rate=float(rate),
-        degree=problem.family.degree,
-        floor=problem.floor,
-        route=proposal.route,
-        outcome=outcome.outcome if isinstance(outcome, Rejected) else Proven(),
-        condition_number=None if proven is None else proven.condition_number.above,
-        undecided=isinstance(outcome, Rejected) and outcome.undecided,
-    )
-
-
 def kappa(metric: VerifiedMetric) -> float:
     """What a problem minimises, as it came out."""
     plain = metric.floor == "identity" and metric.coordinates == "identity"
@@ -373,12 +354,21 @@ class Ladder:
     ) -> VerifiedMetric | Rejected:
         """What the proof makes of a proposal, which is kept and told."""
         outcome = shortest_proven(problem, proposal, rate, effort, self.request.proofs)
-        attempt = attempted(problem, rate, proposal, outcome)
+        rejected = outcome if isinstance(outcome, Rejected) else None
+        number = None if isinstance(outcome, Rejected) else outcome.condition_number.above
+        attempt = Attempt(
+            rate=float(rate),
+            degree=problem.family.degree,
+            floor=problem.floor,
+            route=proposal.route,
+            outcome=Proven() if rejected is None else rejected.outcome,
+            condition_number=number,
+            undecided=rejected is not None and rejected.undecided,
+        )
         self.attempts.append(attempt)
         if isinstance(outcome, VerifiedMetric):
             self.proven.append(outcome)
         if self.request.progress:
-            number = attempt.condition_number
             words = attempt.outcome.tag if number is None else f"proven, condition number {number:.4g}"
             self.request.progress(
                 Step(phase=Phase.SYNTHESIS, name=f"rate {attempt.rate:.4g}, degree {attempt.degree}: {words}")

@@ -17,7 +17,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
-from math import gcd
+from itertools import combinations_with_replacement
+from math import gcd, prod
 
 from tubecert.expression import ONE, ZERO, Expression, coefficient, constant, rebuild, symbol, topological
 from tubecert.expression.matrix import Matrix, Rows, matrix
@@ -44,14 +45,12 @@ class Lifted:
     atoms: dict[str, Expression]
 
 
-def sine_name(variable: str) -> str:
-    """The symbol that stands for the sine of a variable's angle; no name of a specification has a #."""
-    return f"sin#{variable}"
-
-
-def cosine_name(variable: str) -> str:
-    """The symbol that stands for the cosine of a variable's angle."""
-    return f"cos#{variable}"
+def products(atoms: Sequence[Expression], degree: int) -> Iterator[tuple[tuple[Expression, ...], Expression]]:
+    """Choices of at most `degree` atoms, each with its product, without squares of sines (sin^2 = 1 - cos^2)."""
+    for d in range(degree + 1):
+        for choice in combinations_with_replacement(atoms, d):
+            if not any(choice.count(a) > 1 for a in choice if a.op == "sin"):
+                yield choice, prod(choice, start=ONE)
 
 
 def unit_angles(expressions: Iterable[Expression]) -> dict[str, Fraction]:
@@ -116,7 +115,7 @@ def _angle(
         return None
     s, c = ZERO, ONE
     for variable, count in sorted(counts.items()):
-        names = circles.setdefault(variable, (sine_name(variable), cosine_name(variable)))
+        names = circles.setdefault(variable, (f"sin#{variable}", f"cos#{variable}"))
         one_s, one_c = symbol(names[0]), symbol(names[1])
         if count < 0:
             one_s = -one_s

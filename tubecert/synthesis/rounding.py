@@ -15,11 +15,10 @@ import numpy as np
 from tubecert.claims.failures import ConditionUnbounded, NoProposal, NotProven, Outcome, WrongShape
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant
-from tubecert.enclosure.interval import Array, Interval
+from tubecert.enclosure.interval import Array
 from tubecert.enclosure.linalg import whitening
 from tubecert.expression.matrix import Matrix
 from tubecert.metric.verify import MetricProof, Proofs
-from tubecert.model import ControlAffineModel
 from tubecert.synthesis.attack import Attack, Attacker
 from tubecert.synthesis.family import Choice, MetricFamily, functions_at
 from tubecert.synthesis.forms import FormsTape
@@ -82,14 +81,14 @@ def shortest_proven(
 
     def proven(digits: int) -> VerifiedMetric | Rejected:
         dual = problem.family.dual_metric(rounded(values, digits, functions))
-        proof = known.of(with_metric(problem.model, dual, rate), problem.safe_set, effort)
+        proof = known.of(replace(problem.model, W=dual, rate=rate), problem.safe_set, effort)
         return _failure(proposal, proof) or VerifiedMetric(
             rate=rate,
             floor=problem.floor,
             coordinates=problem.coordinates,
             dual_metric=dual,
             proof=proof,
-            condition_number=condition_number(proof),
+            condition_number=proof.condition_number(),
             digits=digits,
             family=problem.family,
             proposal=proposal,
@@ -177,20 +176,6 @@ def _failure(proposal: Proposal, proof: MetricProof) -> Rejected | None:
     if proof.failed is not None:
         failed = NotProven(route=proposal.route, condition=proof.failed, verdict=Verdict(proof.verdict))
         return Rejected(outcome=failed, undecided=failed.verdict is Verdict.UNDECIDED)
-    if not isfinite(condition_number(proof).above):
+    if not isfinite(proof.condition_number().above):
         return Rejected(outcome=ConditionUnbounded(route=proposal.route))
     return None
-
-
-def with_metric(model: ControlAffineModel, dual: Matrix, rate: Fraction) -> ControlAffineModel:
-    """The model with another metric."""
-    return replace(model, W=dual, rate=rate)
-
-
-def condition_number(proof: MetricProof) -> Constant:
-    """sup lmax(M)/inf lmin(M) = sup lmax(W)/inf lmin(W) on the safe set, enclosed."""
-    assert proof.lower_on_set is not None
-    assert proof.upper_on_set is not None
-    low, high = proof.lower_on_set, proof.upper_on_set
-    ratio = Interval(high.below, high.above) / Interval(low.below, low.above)
-    return Constant(below=float(ratio.lo), above=float(ratio.hi))
