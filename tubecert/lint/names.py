@@ -53,23 +53,22 @@ def _unused(spec: Spec) -> Iterator[Finding]:
     """Parameters and definitions are substituted when they are read, so their names are looked for in the text."""
     text = "\n".join(re.sub(r"(^|\s)#.*", "", line) for line in spec.source.splitlines())
     words = re.findall(r"\b[A-Za-z]\w*", text)
-    named = [("parameter", name) for name, _ in (*spec.parameters, *spec.ranges)]
-    named += [("table", table.name) for table in spec.tables]
-    for what, name in [*named, *(("definition", name) for name in spec.definitions)]:
+    for what, name in _given(spec):
         if words.count(name) < 2:
             message = f"the {what} {name} is never used"
             help = "remove it, or use it"
             yield finding(spec, codes.UNUSED, f"system.{what}s.{name}", message, help)
 
 
+def _given(spec: Spec) -> list[tuple[str, str]]:
+    """The names beside those of states and inputs, each after what it names."""
+    parameters = [("parameter", name) for name, _ in (*spec.parameters, *spec.ranges)]
+    tables = [("table", table.name) for table in spec.tables]
+    return [*parameters, *tables, *(("definition", name) for name in spec.definitions)]
+
+
 def _confusable(spec: Spec) -> Iterator[Finding]:
-    names = [
-        *spec.states,
-        *spec.inputs,
-        *(name for name, _ in (*spec.parameters, *spec.ranges)),
-        *(table.name for table in spec.tables),
-        *spec.definitions,
-    ]
+    names = [*spec.states, *spec.inputs, *(name for _, name in _given(spec))]
     for name in names:
         word = next((word for word in _WORDS if word == name.lower()), None)
         if word is not None:

@@ -305,15 +305,14 @@ class SynthesisRun:
         proof = self.memory.proofs.of(model, spec.safe_set, self.effort)
         if proof.failed is not None:
             return self._failed(NotProvenAsWritten(condition=proof.failed), RaiseBudget())
+        file, limits = file_of(spec, proof, metric), self.climb.limits()
+        return replace(self._ended(proof.verdict), spec=spec, file=file, limits=limits)
+
+    def _ended(self, verdict: Verdict) -> Synthesised:
+        """A verdict, with what was tried."""
+        attempts = tuple(self.ladder.attempts)
         return Synthesised(
-            verdict=proof.verdict,
-            wanted=self.wanted,
-            spec=spec,
-            file=file_of(spec, proof, metric),
-            rows=self._table(),
-            attempts=tuple(self.ladder.attempts),
-            limits=self.climb.limits(),
-            cut=self.cut,
+            verdict=verdict, wanted=self.wanted, rows=self._table(), attempts=attempts, cut=self.cut
         )
 
     def _table(self) -> tuple[Row, ...]:
@@ -326,15 +325,8 @@ class SynthesisRun:
         verdict: Verdict = Verdict.UNDECIDED,
         at: Witness | None = None,
     ) -> Synthesised:
-        claim = MetricFound(failure=failure)
-        return Synthesised(
-            verdict=verdict,
-            wanted=self.wanted,
-            reason=Reason(claim=claim, verdict=verdict, at=at, relax=relax),
-            rows=self._table(),
-            attempts=tuple(self.ladder.attempts),
-            cut=self.cut,
-        )
+        reason = Reason(claim=MetricFound(failure=failure), verdict=verdict, at=at, relax=relax)
+        return replace(self._ended(verdict), reason=reason)
 
     def _explained(self) -> Synthesised:
         """Why there is no metric, where no mode excludes the rate: condition number, degree, rate, box."""

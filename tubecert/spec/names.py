@@ -323,9 +323,8 @@ def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) 
             refused[name] = f"{name} is defined by itself"
         term = entry.term(replace(scope, refused={**scope.refused, **refused}))
         if name is not None:
-            meant = Parsed(expression=ONE, obligations=())
-            if term is not None:
-                meant = Parsed(expression=term.expression, obligations=term.obligations)
+            known = (ONE, ()) if term is None else (term.expression, term.obligations)
+            meant = Parsed(expression=known[0], obligations=known[1])
             names = replace(names, definitions=(*names.definitions, (name, meant)))
     return names
 
