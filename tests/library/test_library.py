@@ -69,6 +69,23 @@ def test_a_mapping_is_the_same_system_as_its_file(path):
     assert tc.specification(spec.data) == spec  # the effective specification is one
 
 
+def test_a_ball_of_many_states_stays_one():
+    names = "abcd"
+    ball = tc.specification(
+        {
+            "name": "ball", "system": {"states": list(names), "inputs": list("uvwx"), "f": [f"-{x}" for x in names],
+            "B": [[str(int(x == y)) for x in names] for y in names]},
+            "safe_set": {x: ["-1", "1"] for x in names}, "uncertainty": {"h": ["0"] * 4},
+            "trajectory": {"kind": "equilibrium", "at": ["0"] * 4}, "initial_state": {"at": ["0"] * 4},
+            "metric": {"rate": "0.5", "dual_metric": [[str(int(x == y)) for x in names] for y in names]},
+            "tube": {"epsilon": "0.1", "rho_a": "0.1", "coordinates": "identity"},
+        }
+    )  # fmt: skip
+    again = tc.specification(ball.data)
+    assert again == ball
+    assert again.spec.tube.coordinates == "identity"
+
+
 def test_a_text_is_one_too(tmp_path):
     (tmp_path / "cart.yaml").write_text(TEXT, encoding="utf-8")
     spec = tc.load(tmp_path / "cart.yaml")
