@@ -388,6 +388,10 @@ def test_a_plan_outside_of_the_safe_set_is_one_in_the_checkers_eyes_too():
     forged = respecified(made, lambda s: s["safe_set"].update(x=["-1", "1"]))
     forged["result"]["safe_set"]["x"] = [-1.0, 1.0]
     assert [name for name, _ in failing(examine(sealed(forged)))] == ["refuted: plan_in_safe_set"]
+    for key in ("state", "side"):
+        own = made["result"]["reasons"][0][key]
+        other = {"lower": "upper", "upper": "lower", "x": "y"}[own]
+        assert failed((made, {}), lambda r, key=key, other=other: r["reasons"][0].update({key: other})), key
 
 
 def test_a_start_outside_of_the_half_widths_is_one_in_the_checkers_eyes_too():
@@ -397,3 +401,4 @@ def test_a_start_outside_of_the_half_widths_is_one_in_the_checkers_eyes_too():
     assert failing(examine(made)) == []
     forged = respecified(made, lambda s: s["initial_state"].update(at=["0.2", "0"]))
     assert [name for name, _ in failing(examine(sealed(forged)))] == ["refuted: start_in_tube"]
+    assert failed((made, {}), lambda r: r["reasons"][0].update(half_width=0.001))

@@ -81,11 +81,12 @@ def _refutation(case: Case, reason: Reason) -> Outcome:
     if name in _AT_A_POINT and at is not None:
         return _metric_fails(case, name, [exact(value) for value in at[1]])
     if name == "tube_in_safe_set" and at is not None:
-        return _leaves(case, at[0])
+        return _leaves(case, at[0], (str(reason.parameters["state"]), str(reason.parameters["side"])))
     if name == "plan_in_safe_set" and at is not None:
-        return _within_none(case, Fraction(0), at[0])
+        own = str(reason.parameters["state"]), str(reason.parameters["side"])
+        return _within_none(case, Fraction(0), at[0], own)
     if name == "start_in_tube":
-        return _starts_outside(case, str(reason.parameters["state"]))
+        return _starts_outside(case, str(reason.parameters["state"]), reason.parameters["half_width"])
     if name == "input_within_limits":
         return _plan_exceeds(case, str(reason.parameters["input"]), None if at is None else at[0])
     section = str(reason.parameters.get("section"))
@@ -141,31 +142,35 @@ def _value(case: Case, rows: Rows, point: list[Ball]) -> list[list[Ball]]:
     return [[next(flat) for _ in row] for row in rows]
 
 
-def _leaves(case: Case, at: Fraction | None) -> Outcome:
+def _leaves(case: Case, at: Fraction | None, face: tuple[str, str]) -> Outcome:
     """The plan comes closer to a face of the safe set than the radius, near the time of the witness."""
     if case.result.tube is None:
         return stated(False, "no radius is stated")
     if case.result.specification.coordinates:
         return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
-    return _within_none(case, _least_radius(case, case.result.tube), at)
+    return _within_none(case, _least_radius(case, case.result.tube), at, face)
 
 
-def _within_none(case: Case, own: Fraction, at: Fraction | None) -> Outcome:
+def _within_none(case: Case, own: Fraction, at: Fraction | None, face: tuple[str, str]) -> Outcome:
     """The plan, with a ball of radius `own` around it, is beyond a face of the safe set near a time."""
-    s, rho, family = case.system, exact(own), case.result.specification.trajectory
+    s, rho, family, (name, side) = case.system, exact(own), case.result.specification.trajectory, face
+    if name not in s.states:
+        return stated(False, "no such state is known")
+    least, most = s.safe_set[name]
     if isinstance(family, AnyPlan):  # some plan of it is at each face of its box
-        pairs = [(family.x[name], s.safe_set[name]) for name in s.states]
-        return _if(any(low - own < least or high + own > most for (low, high), (least, most) in pairs))
-    _, x, _ = _near(case, at).middle()
-    ranges = (s.safe_set[name] for name in s.states)
-    return _if(any(v + rho > exact(hi) or v - rho < exact(lo) for v, (lo, hi) in zip(x, ranges, strict=True)))
+        low, high = family.x[name]
+        return _if(high + own > most if side == "upper" else low - own < least)
+    v = _near(case, at).middle()[1][s.states.index(name)]
+    return _if(bool(v + rho > exact(most)) if side == "upper" else bool(v - rho < exact(least)))
 
 
-def _starts_outside(case: Case, name: str) -> Outcome:
+def _starts_outside(case: Case, name: str, told: object) -> Outcome:
     """A state starts farther from the plan's than the half-width that is asked for."""
     s, asked = case.system, case.result.specification.half_widths
     if name not in s.states or name not in asked:
         return stated(False, "no half-width is asked for")
+    if told != asked[name]:
+        return stated(False, "another half-width is asked for")
     if s.within is not None:
         return _if(s.within > asked[name])
     i = s.states.index(name)
