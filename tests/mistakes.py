@@ -174,7 +174,7 @@ MISTAKES: list[tuple[str, str, str, int, int, str]] = [
     ("-k/m*z", "-k/m*[z]", "TC109", 8, 16, "an entry is one scalar expression"),
     ("-k/m*z", "-k/m*{z}", "TC109", 8, 16, "group with parentheses"),
     ("c/m*v", "c/m*abs(v)*v", "TC109", 8, 24, "elsewhere expressions must be differentiable"),
-    ("c/m*v", "c/m*v*abs(v)", "TC109", 8, 26, "v*abs(v) is, as drag(v) with tables:"),
+    ("c/m*v", "c/m*v*abs(v)", "TC109", 8, 26, "v*abs(v) is, exactly for v in [-9, 9], as drag(v) with tables:"),
     ("c/m*v", "c/m*|v|*v", "TC109", 8, 24, "write abs(x) for an absolute value, in h only; elsewhere"),
     ("c/m*v", "c*sign(v)", "TC110", 8, 22, "sign has a jump"),
     ("c/m*v", "c*sgn(v)", "TC110", 8, 22, "sign has a jump"),
