@@ -4,12 +4,14 @@ import hashlib
 import json
 import pickle
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import proven
 
 from tubecert import certificate
 from tubecert.errors import TubecertError
+from tubecert.library.rechecking import belongs
 from tubecert.recheck.certificate import read_certificate
 from tubecert.recheck.claims import Case
 from tubecert.recheck.document import Node
@@ -70,6 +72,14 @@ def respecified(document: Document, change: Any) -> Document:
     return sealed(document)
 
 
+def confirmed(text: str, **options: Any) -> tuple[Document, dict[str, Any]]:
+    """A certificate that is confirmed, and what was examined of it."""
+    document, memory = certified(text, **options), {}
+    assert document["result"]["verdict"] == "certified"
+    assert failing(examine(document, memory=memory)) == []
+    return document, memory
+
+
 OUTCOMES: dict[int, dict[str, Any]] = {}  # of claims that were examined, by the budget
 
 
@@ -97,6 +107,13 @@ def unconfirmed(document: Document) -> bool:
         return doubted(sealed(document))
     except TubecertError:
         return True
+
+
+def belongs_to(document: Document, text: str, folder: Path) -> str:
+    """What is said of a certificate beside a file with this text."""
+    path = folder / "plant.yaml"
+    path.write_text(text, encoding="utf-8")
+    return belongs(Node(document, "certificate"), "certificate", str(path))
 
 
 def case_of(document: Document, budget: int = 400) -> Case:

@@ -27,7 +27,6 @@ from tubecert.tube import Tube
 
 x, y, z, t = (symbol(name) for name in "xyzt")
 SYMBOLS = {"x": x, "y": y, "z": z, "t": t}
-ONE_ = ((constant(1),),)
 
 
 def number(text: str) -> Expression:

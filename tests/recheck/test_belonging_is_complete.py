@@ -1,12 +1,10 @@
 """`--spec` compares every key, and tells every override and every other text (R23)."""
 
 import pytest
-from rechecked import certified, respecified, sealed
+from rechecked import belongs_to, certified, respecified, sealed
 from systems import SMALL
 
 from tubecert.certificate.belonging import ForeignError
-from tubecert.library.rechecking import belongs
-from tubecert.recheck.document import Node
 
 PLAN = "{kind: equilibrium, at: [0, 0], input: [0]}"
 ROWS = "t,x,y,u\n0,0,0,0\n1,0,0,0\n"
@@ -21,21 +19,15 @@ OVERRIDES = {
 }
 
 
-def sentence(document, text, folder):
-    path = folder / "plant.yaml"
-    path.write_text(text, encoding="utf-8")
-    return belongs(Node(document, "certificate"), "certificate", str(path))
-
-
 @pytest.mark.parametrize("key", OVERRIDES)
 def test_every_override_is_told_with_its_value(key, tmp_path):
     """Nothing was said of `conditions: 0` where the file lets B decide, nor of gains that were asked for."""
     text = SMALL + 'conditions: {decides: "B"}\n'
     document = certified(text, conditions=None)
-    assert "command line" not in sentence(document, text, tmp_path)
+    assert "command line" not in belongs_to(document, text, tmp_path)
     document["result"]["overrides"] = {key: OVERRIDES[key]}
     shown = "tube.epsilon = 0.2" if key == "settings" else f"{key} = {OVERRIDES[key]}"
-    assert f"with {shown} given on the command line" in sentence(sealed(document), text, tmp_path)
+    assert f"with {shown} given on the command line" in belongs_to(sealed(document), text, tmp_path)
 
 
 def test_other_bytes_of_a_plan_are_told(tmp_path):
@@ -43,9 +35,9 @@ def test_other_bytes_of_a_plan_are_told(tmp_path):
     (tmp_path / "plan.csv").write_text(ROWS, encoding="utf-8")
     text = SMALL.replace(PLAN, f"{{kind: csv, file: {tmp_path}/plan.csv}}")
     document = certified(text, conditions="no_adaptation")
-    assert "has changed" not in sentence(document, text, tmp_path)
+    assert "has changed" not in belongs_to(document, text, tmp_path)
     document["result"]["plan"]["file_hash"] = "sha256:" + 64 * "0"
-    assert "plan.csv has changed, the system has not" in sentence(sealed(document), text, tmp_path)
+    assert "plan.csv has changed, the system has not" in belongs_to(sealed(document), text, tmp_path)
 
 
 def test_every_section_of_the_specification_is_compared(tmp_path):
@@ -74,7 +66,7 @@ def test_every_section_of_the_specification_is_compared(tmp_path):
 
         forged = respecified(document, change)
         if key in idle:
-            assert f"nothing rests on what differs: {key}" in sentence(forged, SMALL, tmp_path)
+            assert f"nothing rests on what differs: {key}" in belongs_to(forged, SMALL, tmp_path)
         else:
             with pytest.raises(ForeignError, match=key):
-                sentence(forged, SMALL, tmp_path)
+                belongs_to(forged, SMALL, tmp_path)

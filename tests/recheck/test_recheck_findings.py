@@ -7,7 +7,7 @@ from fractions import Fraction
 import proven
 import pytest
 from flint import ctx
-from rechecked import case_of, certified, digest, examine, failing, respecified, sealed, shipped
+from rechecked import belongs_to, case_of, certified, digest, examine, failing, respecified, sealed, shipped
 from systems import BLOWN, SCALAR, SMALL
 
 from tubecert import spec
@@ -15,20 +15,12 @@ from tubecert.certificate.belonging import ForeignError
 from tubecert.certificate.result import Result
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.expression import number_text
-from tubecert.library.rechecking import belongs
 from tubecert.recheck import geodesics
 from tubecert.recheck.claims import of_certified
 from tubecert.recheck.constants import feedback_gain
-from tubecert.recheck.document import Node
 from tubecert.records import FormError
 
 GIVEN = 'metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}'
-
-
-def belongs_to(document, text, folder):
-    path = folder / "plant.yaml"
-    path.write_text(text, encoding="utf-8")
-    return belongs(Node(document, "certificate"), "certificate", str(path))
 
 
 @pytest.mark.parametrize(

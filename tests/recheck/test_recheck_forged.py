@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from rechecked import certified, examine, failing, respecified, sealed
+from rechecked import certified, confirmed, examine, failing, respecified, sealed
 from systems import BLOWN, SMALL
 
 from tubecert.errors import TubecertError
@@ -25,17 +25,9 @@ Result = dict[str, Any]
 Change = Callable[[Result], object]
 
 
-def examined(text: str, **options: Any) -> Any:
-    """A certificate that is confirmed, and what was examined of it."""
-    document, memory = certified(text, **options), {}
-    assert document["result"]["verdict"] == "certified"
-    assert failing(examine(document, memory=memory)) == []
-    return document, memory
-
-
 @pytest.fixture(scope="module")
 def honest():
-    return examined(TEXT, bare=False)
+    return confirmed(TEXT, bare=False)
 
 
 def failed(honest: Any, change: Change) -> list[str]:
@@ -206,7 +198,7 @@ def test_what_is_stated_worse_than_it_is_stays_confirmed(honest, name):
 
 
 def test_a_distance_below_the_start_is_refused_where_d_falls_from_there():
-    far = examined(
+    far = confirmed(
         SMALL.replace("0.1*sin(t) + 0.05*x", "0.01*sin(t)").replace("at: [0.05, 0]", "at: [0.15, 0.1]"),
         conditions="distance",
     )
@@ -220,7 +212,7 @@ def test_a_distance_below_the_start_is_refused_where_d_falls_from_there():
 
 @pytest.fixture(scope="module")
 def strong():
-    return examined(SMALL.replace("0.1*sin(t)", "0.4*sin(t)"), conditions="distance")
+    return confirmed(SMALL.replace("0.1*sin(t)", "0.4*sin(t)"), conditions="distance")
 
 
 TOLD: dict[str, Change] = {
@@ -239,18 +231,18 @@ def test_what_is_told_of_a_feedback_that_does_not_suffice_is_true(strong, name):
 @pytest.fixture(scope="module")
 def asked():
     """Gains that do for B and not for A, for which 0 decides."""
-    return examined(SMALL, conditions="0", bandwidth=Fraction(5), adaptation_rate=Fraction(26_000))
+    return confirmed(SMALL, conditions="0", bandwidth=Fraction(5), adaptation_rate=Fraction(26_000))
 
 
 @pytest.fixture(scope="module")
 def weak():
     """Gains that do for neither."""
-    return examined(SMALL, conditions="0", bandwidth=Fraction("0.5"), adaptation_rate=Fraction(10_000))
+    return confirmed(SMALL, conditions="0", bandwidth=Fraction("0.5"), adaptation_rate=Fraction(10_000))
 
 
 @pytest.fixture(scope="module")
 def windy():
-    return examined(BLOWN, conditions="distance")
+    return confirmed(BLOWN, conditions="distance")
 
 
 def without_gains(r: Result) -> None:
@@ -323,7 +315,7 @@ def test_a_tube_that_is_wider_than_it_has_to_be_refutes_nothing():
 @pytest.mark.parametrize("gain", ["bandwidth", "adaptation_rate"])
 def test_gains_that_were_asked_for_are_those_that_are_judged(key, option, gain):
     asked = {"bandwidth": Fraction(300), "adaptation_rate": Fraction(10**9)}
-    made = examined(SMALL, conditions=option, **asked)
+    made = confirmed(SMALL, conditions=option, **asked)
 
     def change(r: Result) -> None:
         r["overrides"][gain] *= 2
@@ -340,7 +332,7 @@ def test_a_pair_of_b_is_called_asked_where_it_was():
     """Where gains were asked for no others decide, and where none were none are told as if they had been."""
     asked = {"bandwidth": Fraction(300), "adaptation_rate": Fraction(10**9)}
     for options, gone, there in (({}, "least_adaptation", "asked"), (asked, "asked", "least_adaptation")):
-        made = examined(SMALL, conditions="distance", **options)
+        made = confirmed(SMALL, conditions="distance", **options)
 
         def change(r: Result, gone: str = gone, there: str = there) -> None:
             r[B][there], r[B][gone] = r[B][gone], None
@@ -351,7 +343,7 @@ def test_a_pair_of_b_is_called_asked_where_it_was():
 @pytest.mark.parametrize(("key", "option"), [(A, "26"), (B, "distance")])
 def test_a_predictor_that_was_asked_for_is_the_one_that_is_proven(key, option):
     """Where the rate is as large as one likes, another one would do."""
-    made = examined(SMALL, conditions=option)
+    made = confirmed(SMALL, conditions=option)
 
     def change(r: Result) -> None:
         pair(r, key, predictor_gain=2, adaptation_rate=10**6)
@@ -369,7 +361,7 @@ def test_an_input_stays_within_both_of_its_limits(honest, limits, holds):
 
 
 def test_an_input_is_bounded_by_what_is_certified_alone():
-    made = examined(
+    made = confirmed(
         SMALL.replace("0.1*sin(t)", "0.4*sin(t)") + "limits: {u: [-9, 9]}\n", conditions="distance"
     )
     assert ALONE not in made[0]["result"]["inputs"][0]["bounds"]
