@@ -89,10 +89,7 @@ CASES = {
 }  # fmt: skip
 
 
-SLOW = {
-    "norm on a tube",
-    "difference",
-}  # linear convergence: natural, or maxima along a whole curve
+SLOW = {"norm on a tube", "difference"}  # linear convergence: natural, or maxima along a whole curve
 
 
 def check(found, truth, gap=0.01):
@@ -228,10 +225,7 @@ def test_a_range_without_a_float_is_bounded_above_only():
 
 
 @pytest.mark.slow
-@given(
-    coefficients=st.lists(fractions(-3, 3, 8), min_size=6, max_size=6),
-    cut=fractions(0, 1, 16),
-)
+@given(coefficients=st.lists(fractions(-3, 3, 8), min_size=6, max_size=6), cut=fractions(0, 1, 16))
 @settings(max_examples=25, deadline=None)
 def test_a_smaller_set_has_no_larger_bound_beyond_the_gap(coefficients, cut):
     a, b, c, d, e, f = coefficients

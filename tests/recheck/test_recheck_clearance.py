@@ -107,10 +107,7 @@ def test_an_obstacle_that_is_met_refutes_unless_it_does_not_decide():
     examined = examine(told)
     assert not failing(examined)
     assert "clearance.verdict" in examined.unread
-    for change in (
-        {"clearance": [0.5, 0.6]},
-        {"shape": {"diagonal": [1e-9, 1e-9], "beside": [0.0, 0.0]}},
-    ):
+    for change in ({"clearance": [0.5, 0.6]}, {"shape": {"diagonal": [1e-9, 1e-9], "beside": [0.0, 0.0]}}):
         forged = copy.deepcopy(told)
         forged["result"]["clearance"][0] |= change
         assert doubted(sealed(forged))

@@ -38,10 +38,7 @@ STARTS = {
     "every state": ({"at": ["0.1", "-2"]}, "at angle = 0.1 rad, speed = -2 rad/s"),
     "box": (box(["-0.1", "0.1"], "0"), "anywhere with angle in [-0.1, 0.1] rad, all else 0"),
     "box and point": (box(["-0.1", "0.1"], "1"), "anywhere with angle in [-0.1, 0.1] rad, speed = 1 rad/s"),
-    "a point with pi": (
-        box([f"{SIXTH_OF_PI}6", f"{SIXTH_OF_PI}7"], "0"),
-        "at angle = 30 deg, all else 0",
-    ),
+    "a point with pi": (box([f"{SIXTH_OF_PI}6", f"{SIXTH_OF_PI}7"], "0"), "at angle = 30 deg, all else 0"),
     "ball": ({"within": "0.05"}, "within 0.05 of the start of the plan"),
 }
 

@@ -45,10 +45,7 @@ def system(states, *, f, B, W, rate, h):
 
 ONE_INPUT = system(
     ("x1", "x2"),
-    f=(
-        F_TWO,
-        lambda x: np.array([-x[0] + 2 * x[1], -0.25 * x[1] ** 3 - 3 * x[0] + 4 * x[1]]),
-    ),
+    f=(F_TWO, lambda x: np.array([-x[0] + 2 * x[1], -0.25 * x[1] ** 3 - 3 * x[0] + 4 * x[1]])),
     B=[["1/2"], ["-2"]],
     W=W_TWO,
     rate="1.74",

@@ -109,9 +109,7 @@ def test_a_number_bounds_the_rate_of_every_input():
     two = FAMILY.replace("[u]", "[u, v]").replace("[[0], [1]]", "[[0, 1], [1, 0]]")
     two = two.replace("u: {u: [-1, 1]}", "u: {u: [-1, 1], v: [-1, 1]}, input_rate: 1/2")
     assert load_text(two).trajectory.bundle.input_rate == (Fraction(1, 2), Fraction(1, 2))
-    assert said(two.replace("1/2", "{u: 1}")) == [
-        "TC105 trajectory.input_rate lacks v / add v: ...",
-    ]
+    assert said(two.replace("1/2", "{u: 1}")) == ["TC105 trajectory.input_rate lacks v / add v: ..."]
 
 
 def test_a_wind_is_bounded_by_its_length_or_by_component():

@@ -283,12 +283,7 @@ def test_the_norm_in_a_metric_is_proven_from_both_sides():
 @pytest.mark.parametrize("interpolation", ["hold", "linear"])
 def test_inputs_that_jump_together_are_not_mixed(interpolation):
     """sup |f + B u*| over the tube of a plan whose two inputs jump at the same times, against samples."""
-    model = replace(
-        POLYNOMIAL,
-        inputs=("u", "v"),
-        f=(sin(y), -x),
-        B=EYE,
-    )
+    model = replace(POLYNOMIAL, inputs=("u", "v"), f=(sin(y), -x), B=EYE)
     u = ("1", "-2"), ("-2", "1"), ("1.5", "-1"), ("-0.5", "2"), ("3", "0")
     rough = replace(knots(interpolation), u=tuple(tuple(map(Fraction, row)) for row in u))
     plan = piecewise_plan(model, rough)
