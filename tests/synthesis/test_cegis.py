@@ -384,7 +384,7 @@ LIES = {
     "huge": lambda s: moved(s, lambda v: v * 1e250),
     "zero": lambda s: moved(s, lambda v: 0 * v + 1),
     "negative": lambda s: moved(s, lambda v: -v),
-    "optimal": lambda s: replace(s, feasible=True, finished=True, bound=1e-3),
+    "optimal": lambda s: replace(s, feasible=True, bound=1e-3),
     "infeasible": lambda s: replace(s, feasible=False),
     "nothing": lambda s: replace(s, values=None, feasible=None),
     "high bound": lambda s: replace(s, bound=np.inf),

@@ -66,7 +66,6 @@ def test_the_largest_eigenvalue_is_a_conic_program(solver):
     a = np.random.default_rng(1).normal(size=(6, 6))
     a = a + a.T
     found = solve(ConicProgram(cost=np.ones(1), semidefinite=[semidefinite(-a, [np.eye(6)])]), solver)
-    assert found.finished
     assert found.feasible
     assert found.objective == pytest.approx(np.linalg.eigvalsh(a)[-1], abs=1e-6)
     assert found.bound == pytest.approx(found.objective, abs=1e-6)
@@ -108,10 +107,9 @@ def test_too_few_iterations_are_said():
     a = np.diag(np.arange(8.0))
     program = ConicProgram(cost=np.ones(1), semidefinite=[semidefinite(-a, [np.eye(8)])])
     found = solve(program, iterations=1)
-    assert not found.finished
     assert found.feasible is None
     assert "max iterations" in found.status
-    assert not solve(program, "cvxpy:SCS", iterations=1, tolerance=1e-12).finished
+    assert "inaccurate" in solve(program, "cvxpy:SCS", iterations=1, tolerance=1e-12).status
 
 
 @pytest.mark.slow

@@ -71,14 +71,13 @@ class ConicProgram:
 class ConicSolution:
     """`values` y (N,), also of an unfinished run, None if there are none; `bound` is the dual's value of the objective.
 
-    `feasible`: the solver's opinion, None if it came to none; `finished`: it met its tolerances; `status`: its words.
+    `feasible`: the solver's opinion, None if it came to none; `status`: its words.
     """
 
     values: Array | None
     objective: float
     bound: float
     feasible: bool | None
-    finished: bool
     status: str
 
     @classmethod
@@ -89,7 +88,6 @@ class ConicSolution:
             objective=np.inf,
             bound=-np.inf,
             feasible=None,
-            finished=False,
             status=status,
         )
 
@@ -186,7 +184,6 @@ def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations:
         objective=float(found.obj_val),
         bound=float(found.obj_val_dual),
         feasible=opinions.get(name),
-        finished=name in ("Solved", "PrimalInfeasible"),
         status=f"Clarabel: {_words(name)}",
     )
 
@@ -341,6 +338,5 @@ def _answer(task: Any, y: Any, name: str, bound: float | None, tolerance: float)
         objective=objective,
         bound=bound,
         feasible=opinions.get(status),
-        finished=status in (cvxpy.OPTIMAL, cvxpy.INFEASIBLE),
         status=f"{name} through cvxpy: {status.replace('_', ' ')}",
     )
