@@ -201,7 +201,7 @@ class Asker:
     heard: Callable[[Any], None] | None = None
     judged: Callable[[Any], None] | None = None
     words: Words = field(default_factory=dict)
-    given: Mapping[str, Any] = field(default_factory=dict)
+    given: Mapping[str, object] = field(default_factory=dict)
 
 
 _CODE: Final = Asker()
@@ -264,9 +264,11 @@ def words_of(function: Callable[..., Any]) -> dict[str, Kind]:
     return found
 
 
-def read(words: Words, given: Mapping[str, Any], pairs: Iterable[tuple[str, str]] = ()) -> dict[str, Any]:
+def read(
+    words: Words, given: Mapping[str, object], pairs: Iterable[tuple[str, str]] = ()
+) -> dict[str, object]:
     """The values of those that are given; raises `SpecError` with everything that is wrong with them."""
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     findings: list[Finding] = []
     for name, kind in words.items():
         if given.get(name) is None:
@@ -286,7 +288,7 @@ def read(words: Words, given: Mapping[str, Any], pairs: Iterable[tuple[str, str]
     return found
 
 
-def exact(value: Number | None) -> Fraction | None:
+def exact(value: object) -> Fraction | None:
     """A number that was read by its kind."""
     assert value is None or isinstance(value, Fraction)
     return value

@@ -69,7 +69,7 @@ def test_a_command_has_every_word_of_its_function(name):
 
 
 def test_every_command_that_asks_is_a_function():
-    assert {*ASKED, "check", "compare", "export"} <= {*said()["commands"]} & {*dir(tc)}
+    assert {*ASKED, "check", "compare", "export"} <= {*said().commands} & {*dir(tc)}
     assert dir(tc) == sorted(tc.__all__)
     with pytest.raises(AttributeError, match="it is called synth"):
         _ = tc.synthesise

@@ -26,5 +26,5 @@ def test_the_metric_is_the_one_that_is_narrow_where_it_was_asked_to_be():
 
 def test_outputs_belong_to_the_objective_tube():
     spec = load_text(TEXT, "spec.yaml")
-    assert wanted_of(spec, {}).outputs == ("p",)
-    assert wanted_of(spec, {"objective": "adaptation"}).outputs == ()
+    assert wanted_of(spec).outputs == ("p",)
+    assert wanted_of(spec, objective="adaptation").outputs == ()

@@ -11,15 +11,15 @@ import shlex
 import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
-from typing import Annotated, Any, Final, TypeAlias
+from typing import Annotated, Any, Final, NamedTuple, TypeAlias
 
 import typer
 
-from tubecert.asking import Choice, Exact, Flag, Kind, Text, Words, asked_by, flag, read
+from tubecert.asking import Choice, Exact, Flag, Kind, Text, Words, asked_by, exact, flag, read
 from tubecert.cli import keeper
 from tubecert.cli.guard import guarded
 from tubecert.errors import ExitCode, SpecError
@@ -67,10 +67,19 @@ OUTPUT: Final[Words] = {
 }
 
 
+class Said(NamedTuple):
+    """What help says of the whole and of commands, and hints to words and options that mean something else."""
+
+    tubecert: Mapping[str, str]
+    commands: Mapping[str, Mapping[str, str]]
+    gone: Mapping[str, str]
+    options: Mapping[str, str]
+
+
 @cache
-def said() -> Mapping[str, Any]:
-    """What help says beside the words of options, by commands, and hints to words that mean something else."""
-    return tomllib.loads((files("tubecert") / "pages" / "commands.toml").read_text(encoding="utf-8"))
+def said() -> Said:
+    """What help says beside the words of options."""
+    return Said(**tomllib.loads((files("tubecert") / "pages" / "commands.toml").read_text(encoding="utf-8")))
 
 
 def _version(wanted: bool) -> None:
@@ -98,13 +107,13 @@ class Output:
     debug: bool = False
 
     @classmethod
-    def of(cls, context: typer.Context, own: Mapping[str, Any]) -> Output:
+    def of(cls, context: typer.Context, own: Output) -> Output:
         """The options given after the command (`own`) together with those given before it.
 
         Raises a usage error for `-q` with `-v`.
         """
         before = context.obj if isinstance(context.obj, cls) else cls()
-        both = cls(**{item.name: own.get(item.name) or getattr(before, item.name) for item in fields(cls)})
+        both = cls(**{name: getattr(own, name) or getattr(before, name) for name in OUTPUT})
         if both.quiet and both.verbose:
             raise typer.BadParameter("--quiet and --verbose exclude each other", ctx=context)
         return both
@@ -122,17 +131,18 @@ class Command:
     def add(self, app: typer.Typer) -> None:
         """Makes it a command of the app, by its name."""
         name = self.run.__name__
-        own = said()["commands"][name]
+        own = said().commands[name]
         made = with_options(self._ask, {**self.words, **self.shared}, version="quiet" in self.shared)
         made.__doc__ = self.run.__doc__
         app.command(name, epilog=own["after"], short_help=own["short"])(made)
 
     def _ask(self, context: typer.Context, **texts: Any) -> None:
-        how = Output.of(context, {name: texts.pop(name) for name in self.shared})
+        how = Output.of(context, Output(**{name: texts.pop(name) for name in self.shared}))
         words = shlex.join(["tubecert", *sys.argv[1:]])
         with guarded(how), asked_by(options=True, command=visible(words)):
             asked = read(self.words, texts, self.pairs)
-            if isinstance(self.words.get("deadline"), Ending) and (seconds := asked.pop("deadline", None)):
+            ending = next((name for name, kind in self.words.items() if isinstance(kind, Ending)), "")
+            if seconds := exact(asked.pop(ending, None)):
                 keeper.left_of(float(seconds), interrupted=True)
             with asked_by(words=self.words, given=asked):
                 code = self.run(how, **asked)
@@ -178,11 +188,11 @@ def with_options(run: Callable[..., None], words: Words, *, version: bool) -> Ca
 def _parameter(name: str, kind: Kind) -> inspect.Parameter:
     default, value = _typed(name, kind)
     metavar = f"<{'|'.join(kind.words)}>" if isinstance(kind, Choice) and not kind.place else kind.metavar
-    said: dict[str, Any] = {"metavar": metavar, "help": kind.help}
+    names = filter(None, (flag(name), kind.short))
     option: Any = (
-        typer.Argument(**said, show_default=False)
+        typer.Argument(metavar=metavar, help=kind.help, show_default=False)
         if kind.place
-        else typer.Option(*filter(None, (flag(name), kind.short)), **said, case_sensitive=False)
+        else typer.Option(*names, metavar=metavar, help=kind.help, case_sensitive=False)
     )
     required = kind.place and not kind.optional
     return inspect.Parameter(

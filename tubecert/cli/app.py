@@ -17,8 +17,8 @@ from tubecert.errors import ExitCode
 _USAGE: type[Exception] = typer.BadParameter.__mro__[2]
 app = typer.Typer(
     name="tubecert",
-    help=said()["tubecert"]["about"],
-    epilog=said()["tubecert"]["after"],
+    help=said().tubecert["about"],
+    epilog=said().tubecert["after"],
     add_completion=True,
     rich_markup_mode=None,  # rich would double the time of --help
     pretty_exceptions_enable=False,
@@ -27,13 +27,13 @@ app = typer.Typer(
 
 
 def _main(context: typer.Context, **given: Any) -> None:
-    context.obj = Output.of(context, given)
+    context.obj = Output.of(context, Output(**given))
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 
 
 app.callback(invoke_without_command=True)(with_options(_main, OUTPUT, version=True))
-for _name in said()["commands"]:
+for _name in said().commands:
     getattr(import_module(f"tubecert.cli.{_name}"), _name).add(app)
 
 

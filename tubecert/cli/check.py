@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -79,10 +80,10 @@ def check(
         files, others = _sorted_out(list(_expand(specs)), {*specs} - {*_folders(specs)}, skip_others)
         # on a cluster files are known by their places in the file system, not by where the command runs
         files = files if scheduler is None else [str(Path(file).resolve()) for file in files]
-        asked: dict[str, Any] = {} if budget is None else {"budget": budget}
         options = CheckOptions(
-            certify=certify, strict=strict, cached=not no_cache, settings=tuple(set_), gap=gap, **asked
+            certify=certify, strict=strict, cached=not no_cache, settings=tuple(set_), gap=gap
         )
+        options = options if budget is None else replace(options, budget=budget)
         executor = _executor(scheduler, jobs, len(files))
         results = _checked(files, options, executor, how) if files else []
         results = [*results, *_skipped(others)] or _nothing(specs)

@@ -78,7 +78,7 @@ def usage_hint(error: Exception, words: Sequence[str]) -> str:
     for word in words if len(option) == 2 else ():
         if word.startswith(option) and len(word) > 2 and word[1:].split("=")[0].replace("-", "").isalpha():
             return f"  {word} is read as single letters; options of several begin with two dashes: -{word}\n"
-    if known := said()["gone"].get(words[0] if words else "") or said()["options"].get(option):
+    if known := said().gone.get(words[0] if words else "") or said().options.get(option):
         return f"  {known}\n"
     message = str(getattr(error, "message", ""))
     if not option and "unexpected" in message and (unit := _UNIT.search(message)):

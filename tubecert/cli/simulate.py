@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -78,7 +78,7 @@ def simulate(
     folder = output or f"{Path(spec).stem}.simulation"
     with prepared(folder), telling.shown(how) as progress:
         if certificate is None:
-            found = _certified(spec, system, folder, certified_with, progress)
+            found = _certified(spec, system, folder, progress, **certified_with)
         else:
             found = _read(certificate, system)
         simulation = simulating.simulate(found, spec=Specification(spec=system), **asked, progress=progress)
@@ -102,7 +102,7 @@ def _read(path: str, system: Spec) -> Certification | SampledCertification:
 
 
 def _certified(
-    file: str, system: Spec, folder: str, given: Mapping[str, Any], progress: Progress | None
+    file: str, system: Spec, folder: str, progress: Progress | None, **given: Any
 ) -> Certification | SampledCertification:
     """A new certificate, which is kept in the folder."""
     from tubecert.library.specification import Specification

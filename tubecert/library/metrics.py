@@ -271,9 +271,10 @@ def synth(
     # metrics are compared end to end by what the specification decides, else by the distance form
     decides = system.decides or DISTANCE.option
     options = pipeline.Options(rho_a=exact(rho_a), epsilon=exact(epsilon), conditions=decides)
+    said: Any = {name: given[name] for name in _OF_SECTION if given.get(name) is not None}
     found = pipeline.synthesise(
         system,
-        wanted_of(system, {name: given[name] for name in _OF_SECTION if given.get(name) is not None}),
+        wanted_of(system, **said),
         options if budget is None else replace(options, budget=budget),
         timed(progress),
         table=table,
@@ -288,7 +289,15 @@ def synth(
     return SynthesisedMetric(found=found, name=system.name, states=system.states)
 
 
-def wanted_of(system: Spec, said: Mapping[str, Any]) -> Synthesis:
+def wanted_of(
+    system: Spec,
+    *,
+    rate: Fraction | None = None,
+    objective: str | None = None,
+    solver: str | None = None,
+    variables: Sequence[str] | None = None,
+    **said: Any,
+) -> Synthesis:
     """What is asked for: the specification's section, changed by what is `said` of it.
 
     Without a section the rate is that of the specification's own metric. Raises `SpecError` if they do not go together.
@@ -298,29 +307,24 @@ def wanted_of(system: Spec, said: Mapping[str, Any]) -> Synthesis:
 
     own = system.synthesis
     if own is None:
-        rate = None if system.metric is None else system.metric.rate
-        own = Synthesis(rate=rate, objective="adaptation" if rate is None else "condition")
-    asked, objective = said.get("rate"), said.get("objective", own.objective)
-    rate = asked or own.rate
-    if objective == "rate" or (
-        objective in ("adaptation", "tube") and asked is None and own.objective != objective
-    ):
-        rate = None  # searched for
-    elif asked is not None and "objective" not in said and own.rate is None:
-        objective = "condition"
-    if objective == "rate" and asked is not None:
+        held = None if system.metric is None else system.metric.rate
+        own = Synthesis(rate=held, objective="adaptation" if held is None else "condition")
+    wanted, best = rate or own.rate, objective or own.objective
+    if best == "rate" or (best in ("adaptation", "tube") and rate is None and own.objective != best):
+        wanted = None  # searched for
+    elif rate is not None and objective is None and own.rate is None:
+        best = "condition"
+    if best == "rate" and rate is not None:
         text = f"the objective rate searches for the rate; {named('rate')} cannot be given"
         refuse(named("objective"), "rate", text)
-    if objective in ("condition", "margin") and rate is None:
-        refuse(named("objective"), objective, f"the objective {objective} needs {named('rate')}, in 1/s")
-    values = {**said, "rate": rate, "objective": objective}
-    if "solver" in said and (solver := solver_name(said["solver"])) is None:
+    if best in ("condition", "margin") and wanted is None:
+        refuse(named("objective"), best, f"the objective {best} needs {named('rate')}, in 1/s")
+    if solver is not None and said.setdefault("solver", solver_name(solver)) is None:
         known = "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows"
-        refuse(named("solver"), said["solver"], known)
-    elif "solver" in said:
-        values["solver"] = solver
-    for name in said.get("variables", ()):
-        if name not in system.states:
-            known = f"{name} is no state; the states are {', '.join(system.states)}"
-            refuse(named("variables"), ",".join(said["variables"]), known)
-    return replace(own, **values, outputs=own.outputs if objective == "tube" else ())
+        refuse(named("solver"), solver, known)
+    if variables is not None:
+        said["variables"] = variables
+        if strange := [name for name in variables if name not in system.states]:
+            known = f"{strange[0]} is no state; the states are {', '.join(system.states)}"
+            refuse(named("variables"), ",".join(variables), known)
+    return replace(own, **said, rate=wanted, objective=best, outputs=own.outputs if best == "tube" else ())

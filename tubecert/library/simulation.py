@@ -11,7 +11,7 @@ import numpy as np
 from tubecert.library.shown import Shown
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from matplotlib.figure import Figure
 
@@ -53,7 +53,7 @@ class _Campaign(Shown):
             raise KeyError(f"{name}: there is nothing that it could show")
         return found
 
-    def _drawers(self) -> Mapping[str, Any]:
+    def _drawers(self) -> Mapping[str, Callable[[Any], Figure | None]]:
         raise NotImplementedError
 
 
@@ -107,7 +107,7 @@ class Simulation(_Campaign):
         with prepared(os.fspath(folder)):
             return write(os.fspath(folder), self.campaign, certificate=self.compared_with)
 
-    def _drawers(self) -> Mapping[str, Any]:
+    def _drawers(self) -> Mapping[str, Callable[[Campaign], Figure | None]]:
         from tubecert.simulation.adaptive.figures import DRAWERS
 
         return DRAWERS
@@ -151,7 +151,7 @@ class SampledSimulation(_Campaign):
             figures = [f"{name}.png" for name in DRAWERS]
             return written_to(os.fspath(folder), self.summary, files(self.campaign), figures)
 
-    def _drawers(self) -> Mapping[str, Any]:
+    def _drawers(self) -> Mapping[str, Callable[[SampledCampaign], Figure | None]]:
         from tubecert.simulation.sampled.figures import DRAWERS
 
         return DRAWERS

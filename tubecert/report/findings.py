@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from rich.text import Text
 
@@ -82,7 +82,7 @@ def page_of(name: str, findings: Sequence[Finding], files: int = 1, place: Place
 
 def as_data(finding: Finding) -> Json:
     """A finding for programs; file, line and column only where it has a place."""
-    place, data = finding.location, dict[str, Any]()
+    place, data = finding.location, dict[str, object]()
     data |= {"code": finding.code, "severity": finding.severity.value, "message": finding.message}
     if place is not None:
         data |= {"file": place.file, "line": place.line, "column": place.column}

@@ -68,7 +68,7 @@ class Followed:
         return cls(loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise), case=case)
 
     @property
-    def data(self) -> dict[str, Json]:
+    def data(self) -> dict[str, object]:
         """The loop and its comparison."""
         return {**self.loop.data, **to_json(self.comparison)}
 
@@ -104,7 +104,7 @@ class Members:
     loops: tuple[Followed, ...]
 
     @property
-    def data(self) -> dict[str, Json]:
+    def data(self) -> dict[str, object]:
         """As it is told."""
         told = {name: getattr(self, name) for name in ("asked", "plans", "runs_each", "largest_defect")}
         return told | {"loops": [item.data for item in self.loops]}
@@ -160,7 +160,7 @@ class Campaign:
         }
 
 
-def _attack_data(attack: Attack, setting: Setting) -> dict[str, Json]:
+def _attack_data(attack: Attack, setting: Setting) -> dict[str, object]:
     """Random runs and the adversary of a loop; h of the latter is a wave in x and t (`loops.Disturbance`)."""
     found, most = attack.adversary, attack.greatest
     data = attack.loop.data | {
@@ -169,13 +169,9 @@ def _attack_data(attack: Attack, setting: Setting) -> dict[str, Json]:
     }
     if found is not None and found.case is not None:
         start, h = found.case
-        data["adversary"] = {
-            **to_json(found.comparison),
-            "start": start[0].tolist(),
-            "h": {name: getattr(h, name)[..., 0].tolist() for name in _WAVES},
-        }
-        if setting.uncertainty.beside:
-            data["adversary"]["beside"] = {name: getattr(h, name)[..., 0].tolist() for name in _BESIDE}
+        drawn = {"h": _WAVES} | ({"beside": _BESIDE} if setting.uncertainty.beside else {})
+        waves = {of: {name: getattr(h, name)[..., 0].tolist() for name in drawn[of]} for of in drawn}
+        data["adversary"] = {**to_json(found.comparison), "start": start[0].tolist(), **waves}
     return data
 
 

@@ -21,7 +21,7 @@ from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.findings import Finding
 from tubecert.kinds import DISTANCE, name_of
 from tubecert.model import ControlAffineModel, build
-from tubecert.records import Json, to_json
+from tubecert.records import to_json
 from tubecert.simulation.adaptive.loops import Controller, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.reading import Certified, Promise, certified_plan, promise
 from tubecert.simulation.adaptive.times import output_times
@@ -207,7 +207,7 @@ class Loop:
         return self.problem.gains
 
     @property
-    def data(self) -> dict[str, Json]:
+    def data(self) -> dict[str, object]:
         """What is told of it."""
         told = {"controller": self.controller, "gains_are": self.gains_are}
         gains = {} if self.gains is None else {"gains": to_json(self.gains)}
