@@ -43,7 +43,7 @@ def painted(ending: str, *figures: Figure) -> bytes:
     from matplotlib.figure import Figure as Canvas
 
     svg = _whole(figures)
-    height = float(svg.attrib["viewBox"].split()[3])
+    height = _height(svg)
     with rc_context({"pdf.fonttype": 42, "font.family": "DejaVu Sans"}):
         canvas = Canvas(figsize=(_COLUMN, _COLUMN * height / WIDTH))
         FigureCanvasAgg(canvas)
@@ -73,7 +73,7 @@ def _whole(figures: Sequence[Figure]) -> ET.Element:
 def _add(svg: ET.Element, figure: Figure, top: float) -> float:
     """A figure from `top` on; where it ends."""
     inner = ET.fromstring(figure.svg)  # noqa: S314 - our own, made by `figures_axes`
-    height = float(inner.attrib["viewBox"].split()[3])
+    height = _height(inner)
     text(svg, (WIDTH / 2, top + 17), figure.title, "middle")
     inner.attrib.update({"y": number(top + _HEAD), "width": str(WIDTH), "height": number(height)})
     svg.append(inner)
@@ -88,6 +88,10 @@ def _add(svg: ET.Element, figure: Figure, top: float) -> float:
 @cache
 def _style() -> str:
     return (files("tubecert.report") / "templates" / "page.css").read_text(encoding="utf-8")
+
+
+def _height(svg: ET.Element) -> float:
+    return float(svg.attrib["viewBox"].split()[3])
 
 
 # -- what a mark looks like
@@ -126,7 +130,7 @@ def _paint(axes: Axes, items: Sequence[ET.Element], at: Transform, clip: Any, st
     for item in items:
         match item.tag:
             case "svg":
-                _paint(axes, list(item), Affine2D().translate(0, float(item.get("y", 0))) + at, clip)
+                _paint(axes, list(item), Affine2D().translate(0, *_numbers(item, "y")) + at, clip)
             case "g":
                 known = re.search(r"#([^)]+)", item.get("clip-path", ""))
                 shape = clips.get(known[1]) if known else None
@@ -151,19 +155,22 @@ def _matrix(item: ET.Element) -> list[list[float]]:
     return [[a, c, e], [b, d, f], [0.0, 0.0, 1.0]]
 
 
+def _numbers(item: ET.Element, *names: str) -> list[float]:
+    """Attributes that are numbers; one that is not there is 0."""
+    return [float(item.get(name, 0)) for name in names]
+
+
 def _outline(item: ET.Element) -> Any:
     """The path of a shape."""
     from matplotlib.path import Path
     from matplotlib.transforms import Affine2D
 
-    own = {key: float(value) for key, value in item.attrib.items() if re.fullmatch(r"-?[\d.]+", value)}
     if item.tag == "rect":
-        return Path.unit_rectangle().transformed(
-            Affine2D().scale(own["width"], own["height"]).translate(own["x"], own["y"])
-        )
+        scaled = Affine2D().scale(*_numbers(item, "width", "height"))
+        return Path.unit_rectangle().transformed(scaled.translate(*_numbers(item, "x", "y")))
     if item.tag in ("circle", "ellipse"):
-        radii = own.get("rx", own.get("r", 0.0)), own.get("ry", own.get("r", 0.0))
-        return Path.unit_circle().transformed(Affine2D().scale(*radii).translate(own["cx"], own["cy"]))
+        scaled = Affine2D().scale(*_numbers(item, *(("r", "r") if item.tag == "circle" else ("rx", "ry"))))
+        return Path.unit_circle().transformed(scaled.translate(*_numbers(item, "cx", "cy")))
     parts = [Path(points, closed=closed) for points, closed in _parts(item.get("d", ""))]
     return Path.make_compound_path(*parts)
 
@@ -197,9 +204,8 @@ def _draw(axes: Axes, item: ET.Element, at: Transform, clip: Any, look: Look) ->
 
     width = float(look.get("stroke-width", 1))
     swept = "sweep" in item.get("class", "") and item.tag == "path"
-    fill, stroke = (
-        (look["stroke"], "none") if swept else (look.get("fill", "none"), look.get("stroke", "none"))
-    )
+    fill, stroke = (look.get(name, "none") for name in ("fill", "stroke"))
+    fill, stroke = (stroke, "none") if swept else (fill, stroke)
     dashes = [float(part) for part in re.findall(r"[\d.]+", look.get("stroke-dasharray", ""))]
     patch = PathPatch(
         _swept(item, width / 2) if swept else _outline(item),
@@ -217,13 +223,13 @@ def _draw(axes: Axes, item: ET.Element, at: Transform, clip: Any, look: Look) ->
 
 
 def _write(axes: Axes, item: ET.Element, at: Transform) -> None:
-    classes = item.get("class", "").split()
+    classes, (x, y) = item.get("class", "").split(), _numbers(item, "x", "y")
     size = next((size for name, size in _SIZES.items() if name in classes), 12.0)
     turned = at.transform([(0, 0), (1, 0)])
     angle = math.degrees(math.atan2(*(turned[1] - turned[0])[::-1]))
     axes.text(
-        float(item.get("x", 0)),
-        float(item.get("y", 0)),
+        x,
+        y,
         (item.text or "").replace("$", r"\$"),
         fontsize=size * _POINTS,
         ha="center" if "middle" in classes else "right" if "end" in classes else "left",
