@@ -32,7 +32,6 @@ _USABLE: Final = 1e-2  # of rho: a run with a larger error estimate is no result
 _EXACT: Final = 1e-6  # what rounding may add to a bound that is met with equality
 _SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "speed")
 _LISTED: Final = 20  # of the runs that left, stopped or came to nothing
-_MEETS: Final = Verdict.REFUTED
 _POINTS: Final = 2001  # of a curve, whose distances from obstacles are taken
 
 
@@ -113,7 +112,7 @@ class Comparison:
 class _Judged(NamedTuple):
     """Runs with what is known of each, (N,): whether it is a result, whether it left the tube, room for its error.
 
-    `deviation` (N, K) is |S (x - x*)|; `first` the number of the first run.
+    `deviation` (N, K) is |S (x - x*)|.
     """
 
     setting: Setting
@@ -122,11 +121,10 @@ class _Judged(NamedTuple):
     left: NDArray[np.bool_]
     room: Array
     deviation: Array
-    first: int
 
 
-def compare(setting: Setting, runs: Runs, promise: Promise | None, first: int = 0) -> Comparison:
-    """The comparison of runs, numbered from `first` on, with the tube, and with a promise if there is one.
+def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison:
+    """The comparison of runs with the tube, and with a promise if there is one.
 
     A run that was stopped has left the tube if it was far outside: its error estimate is void, its exit is not.
     """
@@ -136,20 +134,19 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None, first: int = 
     left |= usable & (peak["distance"] > setting.reach * (1 + room))
     left |= (runs.found.stopped != 0) & (peak["deviation"] > 2 * setting.rho)
     deviation = np.linalg.norm(runs.off @ setting.S.T, axis=2)
-    own = _Judged(setting, runs, usable, left, room, deviation, first)
+    own = _Judged(setting, runs, usable, left, room, deviation)
     bounds = promise.bounds if promise else {"distance": setting.reach, "deviation": setting.rho}
     outside, void, any_usable = np.flatnonzero(left), ~usable & ~left, bool(usable.any())
     unknown = np.flatnonzero(void & (runs.found.stopped == 0))[:_LISTED].tolist()
     return Comparison(
         runs=runs.lanes,
         left_the_tube=len(outside),
-        first_outside=tuple((first + outside[:_LISTED]).tolist()),
+        first_outside=tuple(outside[:_LISTED].tolist()),
         first_exit=_first_exit(own),
         no_result=int(void.sum()),
-        unresolved=tuple(RunAt(run=first + lane, t=_finite(runs.unresolved[lane])) for lane in unknown),
+        unresolved=tuple(RunAt(run=lane, t=_finite(runs.unresolved[lane])) for lane in unknown),
         stopped=tuple(
-            Stopped(run=first + item.lane, t=_finite(item.t), reason=item.reason)
-            for item in runs.failures[:_LISTED]
+            Stopped(run=item.lane, t=_finite(item.t), reason=item.reason) for item in runs.failures[:_LISTED]
         ),
         worst={name: _use(own, name, bounds.get(name)) for name in _SHOWN} if any_usable else {},
         violations=tuple(_violations(own, promise)) if promise else (),
@@ -163,7 +160,7 @@ def _use(own: _Judged, name: str, bound: float | None) -> Use:
     peak, found = own.runs.found.peak[name], own.runs.found
     lane = int(np.argmax(np.where(own.usable, peak, -np.inf)))
     value, t = float(peak[lane]), float(found.peak_time[name][lane])
-    return Use(value=value, bound=bound, share=value / bound if bound else None, run=own.first + lane, t=t)
+    return Use(value=value, bound=bound, share=value / bound if bound else None, run=lane, t=t)
 
 
 def _first_exit(own: _Judged) -> RunAt | None:
@@ -175,7 +172,7 @@ def _first_exit(own: _Judged) -> RunAt | None:
     peaks = own.runs.found.peak_time["deviation"]
     at = np.where(beyond.any(axis=1), own.runs.t[np.argmax(beyond, axis=1)], peaks)
     lane = int(lanes[np.argmin(at[lanes])])
-    return RunAt(run=own.first + lane, t=float(at[lane]))
+    return RunAt(run=lane, t=float(at[lane]))
 
 
 def _settled(own: _Judged, ultimate: float | None) -> float | None:
@@ -220,8 +217,10 @@ def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
         yield from _over_time(own, "D(t)", runs.distance, promise.decay(runs.t), own.setting.reach)
     for item in runs.failures:
         if own.left[item.lane]:
-            value, run = _finite(found.peak["deviation"][item.lane]), own.first + item.lane
-            yield Violation(bound_of="tube", run=run, t=_finite(item.t), value=value, bound=own.setting.rho)
+            value = _finite(found.peak["deviation"][item.lane])
+            yield Violation(
+                bound_of="tube", run=item.lane, t=_finite(item.t), value=value, bound=own.setting.rho
+            )
 
 
 def _over_time(own: _Judged, name: str, values: Array, allowed: Array, scale: float) -> Iterator[Violation]:
@@ -239,13 +238,8 @@ def _broken(
     excess = np.where(own.usable, values - bounds - own.room * scale, -np.inf)
     lane = int(np.argmax(excess))
     if excess[lane] > 0:
-        run, t, value, bound = (
-            own.first + lane,
-            _finite(times[lane]),
-            float(values[lane]),
-            float(bounds[lane]),
-        )
-        yield Violation(bound_of=name, run=run, t=t, value=value, bound=bound)
+        t, value, bound = _finite(times[lane]), float(values[lane]), float(bounds[lane])
+        yield Violation(bound_of=name, run=lane, t=t, value=value, bound=bound)
 
 
 def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: str) -> None:
@@ -272,10 +266,8 @@ def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: 
                 f"the uncertainty leaves the class that was certified: {words} is "
                 f"{near(excess[lane, step])} > {near(bound)} at t = {near(runs.t[step], 4)}"
             )
-            help, place = (
-                f"certify with {declared} declared in uncertainty.bounds",
-                setting.spec.location(where),
-            )
+            help = f"certify with {declared} declared in uncertainty.bounds"
+            place = setting.spec.location(where)
             raise TubecertError([Finding(code="TC706", message=message, location=place, help=help)])
 
 
@@ -291,10 +283,14 @@ class Clearance:
 
 def of_tube(setting: Setting) -> tuple[Clearance, ...]:
     """That of the tube over the whole plan: what is proven, in the certificate."""
-    found = enumerate(setting.result.clearance)
     return tuple(
-        Clearance(obstacle=i, clearance=_finite(own.clearance.below), t=own.t, collides=own.verdict is _MEETS)
-        for i, own in found
+        Clearance(
+            obstacle=i,
+            clearance=_finite(own.clearance.below),
+            t=own.t,
+            collides=own.verdict is Verdict.REFUTED,
+        )
+        for i, own in enumerate(setting.result.clearance)
     )
 
 

@@ -163,10 +163,6 @@ class Campaign:
         error = np.concatenate([seen.error for seen in self.found])
         return {"share": share, "when": when, "value": share * bound, "bound": bound, "error": error}
 
-    def all(self, name: str) -> Array:
-        """One of the `arrays`."""
-        return self.arrays[name]
-
     @property
     def profile(self) -> Array:
         """The largest share by sample, (2, n + m, K): of random runs, of adversaries."""
