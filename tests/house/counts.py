@@ -58,12 +58,12 @@ def _is_mapping_of_any(node: ast.Subscript) -> bool:
 
 
 def _reads_a_key(node: ast.AST) -> bool:
-    """`data["key"]` and `data.get("key")`; not where a key is written."""
+    """`data["key"]` and `data.get("key")`; not where a key is written, and not of the system's environment."""
     if isinstance(node, ast.Subscript):
         forward = isinstance(node.value, ast.Name) and node.value.id in ("list", "tuple", "type")
         return isinstance(node.ctx, ast.Load) and _is_text(node.slice) and not forward
     is_get = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "get"
-    return is_get and bool(node.args) and _is_text(node.args[0])
+    return is_get and bool(node.args) and _is_text(node.args[0]) and ast.unparse(node.func.value) != "os.environ"
 
 
 def _compares_a_sentence(node: ast.AST) -> bool:
