@@ -63,7 +63,9 @@ def _reads_a_key(node: ast.AST) -> bool:
         forward = isinstance(node.value, ast.Name) and node.value.id in ("list", "tuple", "type")
         return isinstance(node.ctx, ast.Load) and _is_text(node.slice) and not forward
     is_get = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "get"
-    return is_get and bool(node.args) and _is_text(node.args[0]) and ast.unparse(node.func.value) != "os.environ"
+    return (
+        is_get and bool(node.args) and _is_text(node.args[0]) and ast.unparse(node.func.value) != "os.environ"
+    )
 
 
 def _compares_a_sentence(node: ast.AST) -> bool:
