@@ -17,7 +17,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from tubecert.certificate.file import dump
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.expression import FUNCTIONS
@@ -63,7 +62,7 @@ def question(result: Result) -> Spec:
     """The specification of a certificate; at rest where the plan is a curve through knots."""
     effective = result.spec.effective
     if result.planned is None:
-        return load_text(dump(effective.data), "certificate")
+        return load_text(effective.text, "certificate")
     unused = ("initial_state", "obstacles", "simulation", "expect", "tube")
     return load_text(effective.at_rest(unused), "certificate")
 
