@@ -7,156 +7,90 @@ of it is imported before it is used.
 import sys
 from types import ModuleType
 
-from tubecert.release import __version__
+from tubecert.release import __version__ as __version__
 
 TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Callable
+if TYPE_CHECKING:  # a type checker reads this, and Python the table below: a name stands in both
+    from tubecert.errors import SpecError as SpecError
+    from tubecert.errors import TargetError as TargetError
+    from tubecert.errors import TubecertError as TubecertError
+    from tubecert.library.certification import Certification as Certification
+    from tubecert.library.certifying import certify as certify
+    from tubecert.library.checks import Checked as Checked
+    from tubecert.library.checks import check as check
+    from tubecert.library.comparing import Comparison as Comparison
+    from tubecert.library.comparing import compare as compare
+    from tubecert.library.exporting import Exported as Exported
+    from tubecert.library.exporting import export as export
+    from tubecert.library.metrics import SynthesisedMetric as SynthesisedMetric
+    from tubecert.library.metrics import VerifiedMetric as VerifiedMetric
+    from tubecert.library.metrics import synth as synth
+    from tubecert.library.metrics import verify as verify
+    from tubecert.library.pages import Report as Report
+    from tubecert.library.pages import report as report
+    from tubecert.library.reading import read as read
+    from tubecert.library.rechecking import Rechecked as Rechecked
+    from tubecert.library.rechecking import recheck as recheck
+    from tubecert.library.sampled import SampledCertification as SampledCertification
+    from tubecert.library.simulating import simulate as simulate
+    from tubecert.library.simulation import SampledSimulation as SampledSimulation
+    from tubecert.library.simulation import Simulation as Simulation
+    from tubecert.library.specification import Specification as Specification
+    from tubecert.library.specification import load as load
+    from tubecert.library.specification import specification as specification
+    from tubecert.library.sweeping import Swept as Swept
+    from tubecert.library.sweeping import sweep as sweep
+    from tubecert.progress import Phase as Phase
+    from tubecert.progress import Step as Step
+    from tubecert.progress import Unit as Unit
+    from tubecert.report.gains import Gains as Gains
+    from tubecert.verdict import Verdict as Verdict
 
-    from tubecert.errors import SpecError, TargetError, TubecertError
-    from tubecert.library.certification import Certification
-    from tubecert.library.certifying import certify
-    from tubecert.library.checks import Checked, check
-    from tubecert.library.comparing import Comparison, compare
-    from tubecert.library.exporting import Exported, export
-    from tubecert.library.metrics import SynthesisedMetric, VerifiedMetric, synth, verify
-    from tubecert.library.pages import Report, report
-    from tubecert.library.reading import read
-    from tubecert.library.rechecking import Rechecked, recheck
-    from tubecert.library.sampled import SampledCertification
-    from tubecert.library.simulating import simulate
-    from tubecert.library.simulation import SampledSimulation, Simulation
-    from tubecert.library.specification import Specification, load, specification
-    from tubecert.library.sweeping import Swept, sweep
-    from tubecert.progress import Phase, Step, Unit
-    from tubecert.report.gains import Gains
-    from tubecert.verdict import Verdict
-
-__all__ = [
-    "Certification",
-    "Checked",
-    "Comparison",
-    "Exported",
-    "Gains",
-    "Phase",
-    "Rechecked",
-    "Report",
-    "SampledCertification",
-    "SampledSimulation",
-    "Simulation",
-    "SpecError",
-    "Specification",
-    "Step",
-    "Swept",
-    "SynthesisedMetric",
-    "TargetError",
-    "TubecertError",
-    "Unit",
-    "Verdict",
-    "VerifiedMetric",
-    "__version__",
-    "certify",
-    "check",
-    "compare",
-    "export",
-    "load",
-    "read",
-    "recheck",
-    "report",
-    "simulate",
-    "specification",
-    "sweep",
-    "synth",
-    "verify",
-]
-
-_HOMES = {
-    "Certification": "library.certification",
-    "Gains": "report.gains",
-    "read": "library.reading",
-    "certify": "library.certifying",
-    "Checked": "library.checks",
-    "check": "library.checks",
-    "Comparison": "library.comparing",
-    "compare": "library.comparing",
-    "Exported": "library.exporting",
-    "export": "library.exporting",
-    "Swept": "library.sweeping",
-    "SynthesisedMetric": "library.metrics",
-    "VerifiedMetric": "library.metrics",
-    "synth": "library.metrics",
-    "verify": "library.metrics",
-    "Rechecked": "library.rechecking",
-    "Report": "library.pages",
-    "SampledCertification": "library.sampled",
-    "SampledSimulation": "library.simulation",
-    "Simulation": "library.simulation",
-    "simulate": "library.simulating",
-    "Specification": "library.specification",
-    "load": "library.specification",
-    "specification": "library.specification",
-    "SpecError": "errors",
-    "TargetError": "errors",
-    "TubecertError": "errors",
-    "Phase": "progress",
-    "Step": "progress",
-    "Unit": "progress",
-    "Verdict": "verdict",
+_ROWS = {
+    "errors": "SpecError TargetError TubecertError",
+    "library.certification": "Certification",
+    "library.certifying": "certify",
+    "library.checks": "Checked check",
+    "library.comparing": "Comparison compare",
+    "library.exporting": "Exported export",
+    "library.metrics": "SynthesisedMetric VerifiedMetric synth verify",
+    "library.pages": "Report report",
+    "library.reading": "read",
+    "library.rechecking": "Rechecked recheck",
+    "library.sampled": "SampledCertification",
+    "library.simulating": "simulate",
+    "library.simulation": "SampledSimulation Simulation",
+    "library.specification": "Specification load specification",
+    "library.sweeping": "Swept sweep",
+    "progress": "Phase Step Unit",
+    "release": "__version__",
+    "report.gains": "Gains",
+    "verdict": "Verdict",
 }
-_ROOMS = {
-    "recheck": "library.rechecking",
-    "report": "library.pages",
-    "sweep": "library.sweeping",
-}
-
-
-class _Room(ModuleType):
-    """A room of the package whose name is that of a function of the library: it can be called as that function."""
-
-    def __call__(self, *arguments: object, **options: object) -> object:
-        return self._function()(*arguments, **options)
-
-    @property
-    def __signature__(self) -> object:
-        import inspect
-
-        return inspect.signature(self._function())
-
-    def _function(self) -> "Callable[..., object]":
-        name = self.__name__.rpartition(".")[2]
-        function: Callable[..., object] = getattr(_module(_ROOMS[name]), name)
-        return function
+_HOMES = {name: home for home, names in _ROWS.items() for name in names.split()}
 
 
 class _Package(ModuleType):
-    """The package: whoever imports one of those rooms first, it can be called."""
+    """The package. A room that is called like a function (`report`) is imported by its path, and never hides it."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name in _ROOMS and isinstance(value, ModuleType):
-            value.__class__ = _Room
-        super().__setattr__(name, value)
+        if not (name in _HOMES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
 
 
 sys.modules[__name__].__class__ = _Package
 
-if not TYPE_CHECKING:  # a type checker knows what there is
+if not TYPE_CHECKING:
+    __all__ = list(_HOMES)
 
     def __getattr__(name):
-        if name in _HOMES:
-            value = getattr(_module(_HOMES[name]), name)
-        elif name in _ROOMS:
-            value = _module(name)
-        else:
+        from importlib import import_module
+
+        if name not in _HOMES:
             hint = "; it is called synth, as the command is" if name == "synthesise" else ""
             raise AttributeError(f"module 'tubecert' has no attribute {name!r}{hint}")
-        globals()[name] = value
+        globals()[name] = value = getattr(import_module(f"tubecert.{_HOMES[name]}"), name)
         return value
 
     def __dir__():
         return sorted(__all__)
-
-
-def _module(name: str) -> ModuleType:
-    from importlib import import_module
-
-    return import_module(f"tubecert.{name}")

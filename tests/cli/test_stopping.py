@@ -44,7 +44,7 @@ STEPS = {
     "solver": ("synth", "import tubecert.synthesis.cegis as place; place.propose = {how}"),
     "certification": ("certify", "import tubecert.pipeline as place; place.certify = {how}"),
     "check": ("check --certify --no-cache", "import tubecert.pipeline as place; place.certify = {how}"),
-    "recheck": ("recheck", "import tubecert.recheck.run as place; place.of_every = {how}"),
+    "recheck": ("recheck", "from tubecert.recheck import run; run.of_every = {how}"),
     "sweep": ("sweep --over tube.epsilon=1,2", "from tubecert.sweep import run; run.certify_point = {how}"),
 }
 

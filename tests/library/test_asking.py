@@ -57,8 +57,6 @@ def test_words_are_known_and_names_are_lists():
 @pytest.mark.parametrize("name", ASKED)
 def test_a_command_has_every_word_of_its_function(name):
     function = getattr(tc, name)
-    if not inspect.isfunction(function):  # a room of this name that can be called
-        function = function._function()
     told = " ".join(run(name, "--help").stdout.split())
     for word, kind in words_of(function).items():
         flag = f"--{word.replace('_', '-')} "

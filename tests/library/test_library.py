@@ -543,17 +543,19 @@ def test_a_single_state_is_drawn_over_time():
 
 
 @pytest.mark.slow
-def test_rooms_that_have_the_names_of_functions_are_both():
+def test_a_room_with_the_name_of_a_function_never_hides_it():
     code = """
 import tubecert.report.page, tubecert.recheck, tubecert.sweep.grid
+import inspect, pydoc
 import tubecert as tc
-import tubecert.sweep as room
-assert room is tc.sweep and room.grid
-assert callable(tc.report) and tc.report.page and callable(tc.recheck)
-import inspect
-assert "progress" in inspect.signature(tc.sweep).parameters
 from tubecert import *
-assert callable(sweep) and callable(certify)
+for name in ("sweep", "report", "recheck"):
+    own = getattr(tc, name)
+    assert inspect.isfunction(own) and own is globals()[name]
+    assert pydoc.plain(pydoc.render_doc(own)).splitlines()[2].startswith(f"{name}(")
+from tubecert.report import page
+from tubecert.recheck import run
+assert inspect.ismodule(page) and inspect.ismodule(run)
 """
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 

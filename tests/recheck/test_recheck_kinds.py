@@ -12,6 +12,7 @@ from texts import replaced
 
 from tubecert import certificate, pipeline, spec
 from tubecert.errors import ExitCode
+from tubecert.recheck import identity
 from tubecert.recheck.balls import exact
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.program import Program
@@ -354,7 +355,7 @@ def test_a_defect_that_vanishes_by_an_addition_theorem_is_confirmed():
 def test_a_defect_that_is_not_proven_to_vanish_is_undecided(monkeypatch):
     """No more is concluded where the addition theorems do not reach."""
     document = wiggling()
-    monkeypatch.setattr("tubecert.recheck.identity._MULTIPLE", 0)
+    monkeypatch.setattr(identity, "_MULTIPLE", 0)
     found = examine(document, memory={})
     verdicts = {claim.outcome.verdict for claim in found.claims if "plan_defect" in claim.name}
     assert verdicts == {"undecided"}
@@ -404,12 +405,11 @@ def test_what_vanishes_by_an_addition_theorem(text):
 @pytest.mark.parametrize("slip", ["sign", "order", "quarter"])
 def test_a_slip_in_the_addition_theorems_is_caught(slip, monkeypatch):
     slips = {
-        "sign": ("_turned", lambda a, b: (a[0] * b[0] + a[1] * b[1], a[1] * b[0] + a[0] * b[1])),
-        "order": ("_turned", lambda a, b: (a[0] * b[0] - a[1] * b[1], a[1] * b[1] + a[0] * b[0])),
-        "quarter": ("_Parts._is_pi", lambda self, monomial: True),
+        "sign": (identity, "_turned", lambda a, b: (a[0] * b[0] + a[1] * b[1], a[1] * b[0] + a[0] * b[1])),
+        "order": (identity, "_turned", lambda a, b: (a[0] * b[0] - a[1] * b[1], a[1] * b[1] + a[0] * b[0])),
+        "quarter": (identity._Parts, "_is_pi", lambda self, monomial: True),
     }
-    name, broken = slips[slip]
-    monkeypatch.setattr(f"tubecert.recheck.identity.{name}", broken)
+    monkeypatch.setattr(*slips[slip])
     failed = 0
     for text in ADDED:
         try:

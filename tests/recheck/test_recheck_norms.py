@@ -95,7 +95,7 @@ def test_what_is_known_of_a_limit_is_not_believed_of_a_smaller_one(monkeypatch):
     assert not norms(own, matrix, most * Fraction(99, 100)).holds
     assert norms(own, matrix, most * Fraction(102, 100)).holds
     assert not norms(own, matrix, most * Fraction(99, 100)).holds
-    monkeypatch.setattr("tubecert.recheck.norms._examined", lambda *_: Outcome(verdict="undecided"))
+    monkeypatch.setattr(by_norms, "_examined", lambda *_: Outcome(verdict="undecided"))
     assert norms(own, matrix, most * Fraction(102, 100)).holds
     assert not norms(own, matrix, most * Fraction(101, 100)).holds
     assert not norms(place(), matrix, most * Fraction(102, 100)).holds  # of another tube
