@@ -80,9 +80,17 @@ _QUOTIENT = re.compile(r"-?\d{1,1500}/0*[1-9]\d{0,1500}")
 def _exact(value: Json, path: str) -> Fraction:
     if isinstance(value, str) and (_DECIMAL.fullmatch(value) or _QUOTIENT.fullmatch(value)):
         return Fraction(value)
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and _finite(value):
         return Fraction(repr(value))
     raise FormError(path, "is not a number")
+
+
+def _finite(value: float) -> bool:
+    """Whether a number of JSON is one of floats: an integer may be beyond them."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 _FOREIGN: dict[Any, tuple[Callable[[Any], Json], Callable[[Json, str], Any]]] = {
@@ -207,7 +215,7 @@ def _scalar(kind: Any, data: Json, path: str) -> Any:
     fits = isinstance(data, (int, float)) if kind is float else isinstance(data, kind)
     if not fits or (kind is not bool and isinstance(data, bool)):
         raise FormError(path, f"is not {words[kind]}")
-    if kind is float and not math.isfinite(data):
+    if kind is float and not _finite(data):
         raise FormError(path, "is not finite")
     return data
 
