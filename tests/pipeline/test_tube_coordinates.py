@@ -9,7 +9,8 @@ from texts import CONFIGS
 
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import FitTube
-from tubecert.claims.statements import PlanInSafeSet, StartInTube, TubeInSafeSet
+from tubecert.claims.statements import HalfWidthFits, PlanInSafeSet, StartInTube, TubeInSafeSet
+from tubecert.enclosure.constant import Witness
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
 from tubecert.simulation.adaptive.attack import cases
@@ -134,16 +135,47 @@ def test_a_radius_is_how_far_the_state_is_off_that_moves_farthest_whatever_the_s
     assert gains(own) == pytest.approx(gains(quarter), rel=1e-2)
 
 
-def test_half_widths_that_leave_the_safe_set_are_told_by_state():
-    found = certify(load_text(PENDULUM.replace("TUBE", "half_widths: {q: 0.5}")), COARSE)
-    assert found.verdict is Verdict.UNDECIDED  # half-widths are bounds: nothing is refuted
-    claim = found.reason.claim
-    assert isinstance(claim, TubeInSafeSet)
-    assert claim.state == "q"
+@pytest.mark.parametrize("others", ["", ", w: 1.2"])
+def test_a_half_width_that_does_not_fit_is_refuted_with_the_one_that_would(others):
+    """Whether the tube would be as wide, or another half-width makes it narrower and still too wide."""
+    found = certify(
+        load_text(PENDULUM.replace("TUBE", f"half_widths: {{q: 0.5{others}}}")), COARSE, brief=True
+    )
+    assert found.verdict is Verdict.REFUTED
+    claim, fits = found.reason.claim, found.reason.relax[0]
+    assert claim == HalfWidthFits(state="q", side="upper", half_width=Fraction(1, 2), excess=0.1)
+    assert found.reason.at == Witness(t=0.0, x=(0.5, 0.0))
+    assert (
+        "half_widths.q is 0.5, 0.1 more than the plan leaves to the upper bound of q" in found.reason.message
+    )
     assert found.tube is None
-    fits = found.reason.relax[0]
-    assert isinstance(fits, FitTube)
-    assert (fits.state, fits.most) == ("q", 0.4)
+    assert fits == FitTube(state="q", most=0.4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "asked",
+    [
+        "q: 0.4",  # what is told to fit
+        "w: 2.5",  # q leaves less: the tube is narrower, and w never goes so far
+        "q: 0.5, w: 0.2",  # nor does q
+    ],
+)
+def test_what_the_tube_does_not_reach_need_not_fit(asked):
+    text = load_text(PENDULUM.replace("TUBE", f"half_widths: {{{asked}}}"))
+    found = certify(text, COARSE, brief=True)
+    assert found.verdict is Verdict.CERTIFIED
+    assert found.tube.half_widths["q"] <= 0.4
+
+
+def test_what_a_tube_by_radii_reaches_in_coordinates_of_its_own_refutes_nothing():
+    tube = "epsilon: 0.6, rho_a: 0.6, coordinates: auto"
+    found = certify(load_text(PENDULUM.replace("TUBE", tube)), COARSE)
+    assert (
+        found.verdict is Verdict.UNDECIDED
+    )  # bounds of what it reaches, in coordinates that were searched for
+    assert isinstance(found.reason.claim, TubeInSafeSet)
+    assert found.reason.relax[0].most == pytest.approx(0.4 * np.sqrt(2.4 / 0.3), rel=1e-6)
 
 
 def test_a_start_outside_of_the_half_widths_is_refuted_in_the_units_of_the_state():

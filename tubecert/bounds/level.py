@@ -72,14 +72,19 @@ def greatest_level(
 ) -> Radius:
     """The greatest rho, but for a thousandth, for which no half-width exceeds the one that was asked for, theory 1a.5.
 
-    `asked` of every state, then of every output of the model.
+    `asked` of every state, then of every output of the model. Where the safe set has less room than that, a smaller
+    one; none if it is a half-width that is asked for which does not fit.
     """
     now, best = proposed, None
     found = _nowhere(now.rho)
     for k in range(_ROUNDS):
         found = settled(suprema, safe_set, now)
         if found.lower is None or found.sides is None:
-            return best or found
+            share = None if best is not None else _narrower(suprema.model.states, found, asked)
+            if share is None or found.sides is None:
+                return best or found
+            now = Proposed(rho=found.rho, sides=found.sides).scaled(share * (1 - _added(k)))
+            continue
         sides = (*found.sides, *_of_outputs(suprema, found, asked[len(found.sides) :]))
         room = min(w / side for w, side in zip(asked, sides, strict=True) if w is not None)
         if room >= 1 and (best is None or found.rho > best.rho):
@@ -89,6 +94,21 @@ def greatest_level(
         factor = room * (1 - _added(k))
         now = Proposed(rho=found.rho, sides=found.sides).scaled(factor)
     return best or replace(found, lower=None, upper=None, obstacle="not_settled")
+
+
+def _narrower(states: Sequence[str], found: Radius, asked: Sequence[Fraction | None]) -> Fraction | None:
+    """By what factor a tube that leaves the safe set has to shrink; None if it may not, or that would not help."""
+    contained = found.contained
+    if contained.verdict is Verdict.CERTIFIED or found.sides is None or contained.room <= 0:
+        return None
+    i = states.index(contained.state)
+    return None if too_wide(found.sides[i], contained, asked[i]) else contained.room / found.sides[i]
+
+
+def too_wide(side: Fraction, contained: Containment, asked: Fraction | None) -> Fraction | None:
+    """By how much the half-width `asked` does not fit, where a tube that is `side` wide leaves; None if it fits."""
+    beyond = Fraction(0) if asked is None else contained.excess + asked - side
+    return beyond if beyond > 0 else None
 
 
 def settled(suprema: Suprema, safe_set: Box, proposed: Proposed) -> Radius:

@@ -169,6 +169,22 @@ class PlanInSafeSet(Claim):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class HalfWidthFits(Claim):
+    """The safe set has room for a half-width; that of `state` exceeds what the plan leaves on `side` by `excess`."""
+
+    name: ClassVar[str] = "the half-widths fit into the safe set"
+    state: str
+    side: Side
+    half_width: Fraction
+    excess: float
+
+    def _why(self, reason: Reason) -> str:
+        when = "" if reason.at is None or reason.at.t is None else f", at t = {near(reason.at.t)}"
+        room = f"the plan leaves to the {self.side} bound of {self.state} in the safe set{when}"
+        return f"half_widths.{self.state} is {near(self.half_width)}, {near(self.excess, 3)} more than {room}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StartInTube(Claim):
     """The start lies in the tube; in `state` it is `off` from the plan's, and `half_width` is asked for."""
 

@@ -19,7 +19,8 @@ from tubecert.verdict import Verdict
 class Containment:
     """Whether the tube lies in the safe set (assumption 1): certified, refuted with place and time, or undecided.
 
-    `outside`: so does the plan itself not, by `excess`; else the tube is too wide by it, and has `room`.
+    `outside`: so does the plan itself not, by `excess`; else the tube is too wide by it, and has `room`. Both are exact
+    bounds, from below.
     """
 
     verdict: Verdict = Verdict.UNDECIDED
@@ -27,8 +28,8 @@ class Containment:
     side: str = ""
     t: float = 0.0
     x: tuple[float, ...] = ()
-    excess: float = 0.0
-    room: float = 0.0
+    excess: Fraction = Fraction(0)
+    room: Fraction = Fraction(0)
     outside: bool = False
 
 
@@ -80,8 +81,8 @@ def containment(
                 side=side,
                 t=t,
                 x=tuple(float(value) for value in place),
-                excess=float(low - limit if outside else low + radius - limit),
-                room=float(limit - high),
+                excess=low - limit if outside else low + radius - limit,
+                room=limit - high,
                 outside=outside,
             )
             if case.verdict is Verdict.REFUTED and (worst is None or case.excess > worst.excess):
@@ -114,7 +115,7 @@ def _knots_outside(
                         side=side,
                         t=float(t),
                         x=tuple(float(value) for value in x),
-                        excess=float(excess),
+                        excess=excess,
                         outside=True,
                     )
     return worst
