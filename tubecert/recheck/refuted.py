@@ -85,6 +85,9 @@ def _refutation(case: Case, reason: Reason) -> Outcome:
     if name == "plan_in_safe_set" and at is not None:
         own = str(reason.parameters["state"]), str(reason.parameters["side"])
         return _within_none(case, Fraction(0), at[0], own)
+    if name == "half_width_fits" and at is not None:
+        own = str(reason.parameters["state"]), str(reason.parameters["side"])
+        return _too_wide(case, reason.parameters["half_width"], at[0], own)
     if name == "start_in_tube":
         return _starts_outside(case, str(reason.parameters["state"]), reason.parameters["half_width"])
     if name == "input_within_limits":
@@ -162,6 +165,14 @@ def _within_none(case: Case, own: Fraction, at: Fraction | None, face: tuple[str
         return _if(high + own > most if side == "upper" else low - own < least)
     v = _near(case, at).middle()[1][s.states.index(name)]
     return _if(bool(v + rho > exact(most)) if side == "upper" else bool(v - rho < exact(least)))
+
+
+def _too_wide(case: Case, told: object, at: Fraction | None, face: tuple[str, str]) -> Outcome:
+    """The half-width that is asked for is more than the plan leaves to a face of the safe set, near a time."""
+    asked = case.result.specification.half_widths.get(face[0])
+    if asked is None or told != asked:
+        return stated(False, "another half-width is asked for, or none")
+    return _within_none(case, asked, at, face)
 
 
 def _starts_outside(case: Case, name: str, told: object) -> Outcome:
