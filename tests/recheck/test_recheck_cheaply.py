@@ -56,7 +56,7 @@ def test_the_drift_along_knots_is_bounded_part_by_part(coarse, share, holds, mon
     monkeypatch.setattr(constants, "_SOME", coarse)
     clock, slope = variable(CLOCK), variable("slope")
     values = [{"slope": arb(0)}, {"slope": arb(1)}]
-    parts = tuple(Part(arb(i), arb(1), own) for i, own in enumerate(values))
+    parts = tuple(Part(Fraction(i), arb(1), own) for i, own in enumerate(values))
     moving = Curve((clock * slope, number(0)), (clock * slope,), parts, Fraction(2), (number(0), number(0)))
     angle, s = np.meshgrid(np.linspace(0, 2 * np.pi, 721), np.linspace(0, 1, 101))
     largest = 0.0

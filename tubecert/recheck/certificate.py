@@ -50,7 +50,7 @@ def read_certificate(document: Node) -> Certificate:
     for key in NOT_HASHED:
         own[key].mapping()
     result = read_result(own["result"])
-    unread = (*NOT_HASHED, *not_examined(own["result"]))
+    unread = (*NOT_HASHED, *not_examined(own["result"], result.verdict))
     return Certificate(result, own["hash"].text(), digest(own["result"].value), unread)
 
 

@@ -12,6 +12,7 @@ within rho of P. No claim contains x*', but for the defect.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -38,7 +39,7 @@ _HALVINGS = 12  # of a part of the plan, until its ranges have bounds
 class Part:
     """x* and u* as terms of s and of named `values`, for s in [0, length] at time start + s."""
 
-    start: Ball
+    start: Fraction
     length: Ball
     values: dict[str, Ball]
 
@@ -76,6 +77,13 @@ class Curve:
     def field(self) -> Field:
         """x* and u* on ranges of s."""
         return Field([*self.x, *self.u], self.parts[0].values)
+
+    def at(self, t: Fraction) -> tuple[list[Ball], list[Ball]]:
+        """x* and u* at a time of the plan; where u* jumps, what it jumps to."""
+        part = self.parts[bisect_right(self.parts, t, key=lambda own: own.start) - 1]
+        field = self.field.with_values(part.values)
+        found = field.at([exact(t - part.start)] if field.variables else [])
+        return found[: len(self.x)], found[len(self.x) :]
 
     @cached_property
     def root(self) -> Segment:
@@ -120,7 +128,8 @@ class Piece(Segment):
         ends = [(floor(value), ceiling(value)) for value in found]
         n = len(curve.x)
         self.x, self.u = ends[:n], ends[n:]
-        self.when = floor(part.start + arb(lo)), ceiling(part.start + arb(hi))
+        start = exact(part.start)
+        self.when = floor(start + arb(lo)), ceiling(start + arb(hi))
 
     def bounded(self, halvings: int = _HALVINGS) -> list[Piece]:
         """Itself, or where it has no bounds (a root of a wide range) shorter ranges that have."""
@@ -145,7 +154,7 @@ class Piece(Segment):
         field = self._curve.field.with_values(self._part.values)
         found = field.at([s] if field.variables else [])
         n = len(self._curve.x)
-        return self._part.start + s, found[:n], found[n:]
+        return exact(self._part.start) + s, found[:n], found[n:]
 
 
 class Bundle(Segment):
@@ -181,7 +190,7 @@ def expressed(
         raise ValueError("a plan that moves needs a horizon")
     clock = {time: variable(CLOCK)}
     length = exact(horizon) if horizon is not None else exact(0) if period is None else period
-    part = Part(exact(0), length, {})
+    part = Part(Fraction(0), length, {})
     start = tuple(replaced(x, {time: number(0)}))
     return Curve(tuple(replaced(x, clock)), tuple(replaced(u, clock)), (part,), horizon, start)
 
@@ -236,7 +245,7 @@ def hermite(
                 [p, (q - p) / h] if not knots.inner else _parabola(knots.inner[k], j, (begin, p), (end, q))
             )
             values |= {f"u{j}#{power}": exact(c) for power, c in enumerate(found)}
-        parts.append(Part(exact(begin), exact(min(end, horizon) - begin), values))
+        parts.append(Part(begin, exact(min(end, horizon) - begin), values))
     return Curve(tuple(x), tuple(u), tuple(parts), horizon, tuple(map(number, knots.x[0])))
 
 
@@ -327,5 +336,5 @@ def everyone(
     stars = [[f"{name}*" for name in names] for names in (states, inputs)]
     x, u = (tuple(map(variable, names)) for names in stars)
     named = dict(zip([*stars[0], *stars[1]], (*P, *U), strict=True))
-    part = Part(exact(0), exact(0) if times is None else as_ball(times[1]), {})
+    part = Part(Fraction(0), exact(0) if times is None else as_ball(times[1]), {})
     return Everyone(x, u, (part,), family.horizon, (), (P, U), named, family.defect)

@@ -124,6 +124,20 @@ _ROWS: Final[Mapping[str, str]] = {
     "metric.bounds: M <=": "spec.effective.metric.bounds.upper",
     "wind_push <=": "spec.effective.disturbance.E",
 }
+_OF_EVERY: Final = (  # claims of a result that is not certified
+    "the specification and what repeats it",
+    "the claim is that of the specification",
+    "bounds are intervals",
+)
+_GIVEN: Final = (
+    "spec",
+    "plan",
+    "verdict",
+    "reasons.claim",
+    "reasons.verdict",
+    "reasons.section",
+)  # what it is about
+_OF_REASONS: Final = ("reasons.margins.*", "reasons.predictor_gain")
 EXAMINED: Final[Mapping[str, str]] = {key: claim for claim, keys in _ROWS.items() for key in keys.split()}
 
 
@@ -132,9 +146,14 @@ def met(result: Node) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_met(result, _TREE)))
 
 
-def not_examined(result: Node) -> tuple[str, ...]:
-    """Those that no claim examines."""
-    return tuple(row for row in met(result) if EXAMINED[row] in (NOTHING, FILE))
+def not_examined(result: Node, verdict: str) -> tuple[str, ...]:
+    """Those that no claim examines; of a result that is not certified also the sections, if not all of them is."""
+    rows, examined = met(result), (*_OF_EVERY, *([UNPROVEN] if verdict == "refuted" else []))
+    told = [row for row in rows if EXAMINED[row] in (NOTHING, FILE)]
+    if verdict != "certified":
+        beside = (row for row in rows if EXAMINED[row] not in (NOTHING, FILE, *examined))
+        told += (row if row in _OF_REASONS else row.partition(".")[0] for row in beside if row not in _GIVEN)
+    return tuple(name for name in dict.fromkeys(told) if name not in _GIVEN)
 
 
 _ROW = "row#"  # no key is written so

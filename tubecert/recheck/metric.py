@@ -64,13 +64,18 @@ def full_rank(s: System, budget: int) -> Outcome:
 def killing(s: System) -> Outcome:
     """C3: d_b W - b_x W - W b_x' vanishes identically for every column b of B."""
     for j, name in enumerate(s.inputs):
-        column = [[row[j]] for row in s.B]
-        slope = turned([[row[0] for row in matrix_slopes(column, state)] for state in s.states])
-        product = times(slope, s.W)
-        defect = plus(along(s.W_x, column), plus(product, turned(product)), -1)
+        defect = killing_defect(s, j)
         if not vanish([e for row in defect for e in row]):
             return _not_killing(s, defect, name)
     return CONFIRMED
+
+
+def killing_defect(s: System, j: int) -> Matrix:
+    """What C3 asks to vanish for an input, (n, n)."""
+    column = [[row[j]] for row in s.B]
+    slope = turned([[row[0] for row in matrix_slopes(column, state)] for state in s.states])
+    product = times(slope, s.W)
+    return plus(along(s.W_x, column), plus(product, turned(product)), -1)
 
 
 def _not_killing(s: System, defect: Matrix, name: str) -> Outcome:

@@ -71,7 +71,7 @@ class Place:
         parts = self.curve.parts
         if all(SINCE in part.values for part in parts):
             return {TIME: variable(SINCE) + variable(CLOCK)}
-        if not (len(parts) == 1 and not parts[0].values and parts[0].start.is_zero()):
+        if not (len(parts) == 1 and not parts[0].values and parts[0].start == 0):
             raise ValueError("f depends on t along a plan whose times are not known")
         return {TIME: variable(CLOCK)}
 

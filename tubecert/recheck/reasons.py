@@ -1,6 +1,6 @@
 """Reasons and assumptions of a certificate: ids with parameters, each id with the parameters that it has.
 
-What a reason says of gains is a statement and is compared; failures of a synthesis are known by their form.
+What a reason says of gains is a statement and is compared; of failures of a synthesis only a mode is examined.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ _NONE: Form = ({}, {})
 
 _CLAIMS: Mapping[str, Form] = {
     "rank_of_B": _NONE,
-    "metric_found": ({"failure": lambda node: _read(node, "id", _FAILURES)[0]}, {}),
+    "metric_found": ({"failure": lambda node: _read(node, "id", _FAILURES)[:2]}, {}),
     "metric_definite": _NONE,
     "metric_killing": ({"input": Node.text}, {"residual": Node.number}),
     "metric_contraction": ({"rate": Node.decimal, "largest_rate": enclosure}, {}),

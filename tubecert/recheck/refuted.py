@@ -13,7 +13,7 @@ slopes must be rational at the point; the roots of the characteristic polynomial
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -23,13 +23,12 @@ from tubecert.recheck import metric, start
 from tubecert.recheck.balls import Ball, exact, floor, is_indefinite
 from tubecert.recheck.claims import Case
 from tubecert.recheck.cover import CONFIRMED, SHARP, Claim, Outcome, stated
-from tubecert.recheck.curve import Segment
 from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.program import Program
 from tubecert.recheck.reasons import Reason
 from tubecert.recheck.result import Result, TubeSection
 from tubecert.recheck.specification import Specification
-from tubecert.recheck.specified.numbers import upright
+from tubecert.recheck.specified.numbers import Numbers, Range, upright
 from tubecert.recheck.specified.plant import Metric, Plant, Wanted
 from tubecert.recheck.specified.trajectory import AnyPlan, Planned, Resting
 from tubecert.recheck.terms import (
@@ -46,7 +45,10 @@ from tubecert.recheck.terms import (
     unit_matrix,
 )
 
-_AT_A_POINT = ("metric_definite", "metric_contraction", "metric_killing", "metric_bound")
+_ROUGH = Fraction(
+    1, 1000
+)  # to which modes are known, of 1 + their size: repeated ones are known to few digits
+_CLOSE = Fraction(1, 10**6)  # of a number, and of a thousandth of its scale: three digits of it are told
 
 
 def of_others(case: Case) -> Iterator[Claim]:
@@ -73,121 +75,220 @@ def of_others(case: Case) -> Iterator[Claim]:
 
 
 def _refutation(case: Case, reason: Reason) -> Outcome:
-    name, result, at = reason.claim, case.result, reason.at
+    """The claim is false, and what is said of where and by how much is what is found again."""
+    name, result = reason.claim, case.result
     if name == "metric_found":
-        return excludes(result.specification)
-    if not isinstance(result.specification.metric, Metric):
-        return Outcome(verdict="undecided", why="refutations of this kind are not examined")
-    if name in _AT_A_POINT and at is not None:
-        return _metric_fails(case, name, [exact(value) for value in at[1]])
-    if name == "tube_in_safe_set" and at is not None:
-        return _leaves(case, at[0], (str(reason.parameters["state"]), str(reason.parameters["side"])))
-    if name == "plan_in_safe_set" and at is not None:
-        own = str(reason.parameters["state"]), str(reason.parameters["side"])
-        return _within_none(case, Fraction(0), at[0], own)
-    if name == "half_width_fits" and at is not None:
-        own = str(reason.parameters["state"]), str(reason.parameters["side"])
-        return _too_wide(case, reason.parameters["half_width"], at[0], own)
-    if name == "start_in_tube":
-        return _starts_outside(case, str(reason.parameters["state"]), reason.parameters["half_width"])
-    if name == "input_within_limits":
-        return _plan_exceeds(case, str(reason.parameters["input"]), None if at is None else at[0])
+        return excludes(result.specification, reason)
     section = str(reason.parameters.get("section"))
     if name == "condition_holds" and section in KEYS and result.sections is not None:
         return _gains_fail(result, section)
-    return Outcome(verdict="undecided", why="refutations of this kind are not examined")
+    if name not in _FALSE or not isinstance(result.specification.metric, Metric):
+        return Outcome(verdict="undecided", why="refutations of this kind are not examined")
+    try:
+        return _FALSE[name](_Told(case, reason))
+    except _AnotherError as wrong:
+        return stated(False, str(wrong))
 
 
-def _metric_fails(case: Case, name: str, point: list[Ball]) -> Outcome:
-    """A condition on the metric is false at the witness."""
-    s = case.system
-    if len(point) != len(s.states) or not _inside(case, point):
-        return stated(False, "the witness does not lie in the safe set")
-    if name == "metric_bound":
-        return _if(any(is_indefinite(_value(case, rows, point)) for rows in _declared_bounds(case)))
-    if name == "metric_definite":
-        return _if(is_indefinite(_value(case, s.W, point)))
-    if name == "metric_contraction" and s.varies:
-        return Outcome(verdict="undecided", why="refutations at a time are not examined")
-    if name == "metric_contraction":
-        basis = metric.null_space(s, metric.on_set(s), case.budget)
-        if isinstance(basis, Outcome):
-            return basis
-        return _if(is_indefinite(_value(case, scaled(-1, times(turned(basis), times(s.F, basis))), point)))
-    return _if(metric.killing(s).verdict == "contradicted")
+class _AnotherError(Exception):
+    """What is told is not what is found."""
 
 
-def _declared_bounds(case: Case) -> list[Matrix]:
-    """Matrices that are positive semidefinite where the declared bounds of M hold: I/a - W and A W - I."""
-    declared, s = case.result.specification.metric, case.system
-    assert isinstance(declared, Metric)
-    eye, found = unit_matrix(len(s.states)), []
-    if declared.lower is not None:
-        found.append(plus(scaled(1 / declared.lower, eye), s.W, -1))
-    if declared.upper is not None:
-        found.append(plus(scaled(declared.upper, s.W), eye, -1))
-    return found
+class _Told:
+    """What is told of a claim that is false, beside what is found: raises `_AnotherError` for what is another."""
+
+    def __init__(self, case: Case, reason: Reason) -> None:
+        self.case, self.claim = case, reason.claim
+        self.parameters: dict[str, Any] = reason.parameters
+        self.t, self.x = reason.at or (None, ())
+
+    def word(self, key: str, *among: str) -> str:
+        """One of several words."""
+        if self.parameters[key] not in among:
+            raise _AnotherError(f"{key} is none that is known there")
+        return str(self.parameters[key])
+
+    def same(self, key: str, own: Fraction | None) -> None:
+        """A number is that of the specification, or of the tube."""
+        if self.parameters[key] != own:
+            raise _AnotherError(f"{key} is another one")
+
+    def close(self, what: str, told: Fraction, own: Ball, ends: Range = (Fraction(0), Fraction(0))) -> None:
+        """A number is the one that is found, on the scale of a range."""
+        far = exact(_CLOSE) * (abs(own) + exact((ends[1] - ends[0]) / 1000))
+        if not abs(exact(told) - own) <= far:
+            raise _AnotherError(f"{what} is not {float(own.mid()):.9g}")
+
+    @property
+    def moment(self) -> Fraction:
+        """The time of the witness: 0 if it names none."""
+        t, horizon = self.t or Fraction(0), self.case.system.horizon
+        if t < 0 or (horizon is not None and t > horizon):
+            raise _AnotherError("the witness is at no time of the plan")
+        return t
+
+    def there(self, x: Sequence[Ball]) -> None:
+        """The witness is the point that is found, if it is one."""
+        for own, told, ends in zip(x, self.x, self.case.system.safe_set.values(), strict=bool(self.x)):
+            self.close("the witness", told, own, ends)
+
+    def indefinite(self, rows: Rows) -> bool:
+        """Whether a matrix is not positive semidefinite at the witness, which lies in the safe set."""
+        return is_indefinite(self.value(rows))
+
+    def value(self, rows: Rows) -> list[list[Ball]]:
+        """A matrix at the witness."""
+        ranges = self.case.system.safe_set.values()
+        if not self.x or not all(lo <= x <= hi for x, (lo, hi) in zip(self.x, ranges, strict=True)):
+            raise _AnotherError("the witness does not lie in the safe set")
+        program = Program([e for row in rows for e in row], self.case.system.states)
+        flat = iter(program.run([exact(x) for x in self.x]))
+        return [[next(flat) for _ in row] for row in rows]
 
 
 def _if(holds: bool) -> Outcome:
-    return (
-        CONFIRMED if holds else Outcome(verdict="undecided", why="it could not be confirmed at the witness")
+    why = "it could not be confirmed at the witness"
+    return CONFIRMED if holds else Outcome(verdict="undecided", why=why)
+
+
+def _not_positive(told: _Told) -> Outcome:
+    return _if(told.indefinite(told.case.system.W))
+
+
+def _too_slow(told: _Told) -> Outcome:
+    """C2 fails at the rate that is asked for, and at the largest there is."""
+    s, largest = told.case.system, told.parameters["largest_rate"]
+    told.same("rate", s.rate)
+    if s.varies:
+        return Outcome(verdict="undecided", why="refutations at a time are not examined")
+    basis = metric.null_space(s, metric.on_set(s), told.case.budget)
+    if isinstance(basis, Outcome):
+        return basis
+    if largest.above is None or not largest.is_interval:
+        raise _AnotherError("no largest rate is told")
+    forms = (
+        plus(s.contraction, s.W, 2 * rate) for rate in (s.rate, largest.above + _CLOSE * abs(largest.above))
     )
+    return _if(all(told.indefinite(scaled(-1, times(turned(basis), times(form, basis)))) for form in forms))
 
 
-def _inside(case: Case, point: list[Ball]) -> bool:
-    ranges = (case.system.safe_set[name] for name in case.system.states)
-    return all(exact(lo) <= x <= exact(hi) for x, (lo, hi) in zip(point, ranges, strict=True))
+def _not_killing(told: _Told) -> Outcome:
+    """An entry of the defect of an input is not 0; the one that is told, if one is."""
+    s, residual = told.case.system, told.parameters.get("residual")
+    defect = metric.killing_defect(s, s.inputs.index(told.word("input", *s.inputs)))
+    shown = [x for row in told.value(defect) for x in row if x > 0 or x < 0]
+    if shown and residual is not None:
+        near = min(shown, key=lambda x: abs(float(x.mid()) - float(residual)))
+        told.close("residual", residual, near)
+    return _if(bool(shown))
 
 
-def _value(case: Case, rows: Rows, point: list[Ball]) -> list[list[Ball]]:
-    flat = iter(Program([e for row in rows for e in row], case.system.states).run(point))
-    return [[next(flat) for _ in row] for row in rows]
+def _beyond_declared(told: _Told) -> Outcome:
+    """I/a - W, or A W - I, is not positive semidefinite; nor is it with the number that is reached."""
+    s, declared, reaches = told.case.system, told.case.result.specification.metric, told.parameters["reaches"]
+    assert isinstance(declared, Metric)
+    below, eye = told.word("side", "lower", "upper") == "lower", unit_matrix(len(s.states))
+    own = declared.lower if below else declared.upper
+    told.same("declared", own)
+    if own is None or min(own, own if reaches is None else reaches) <= 0:
+        raise _AnotherError("a bound is not positive")
+    bounds = [own] if reaches is None else [own, reaches * (1 + (_CLOSE if below else -_CLOSE))]
+    forms = (plus(scaled(1 / a, eye), s.W, -1) if below else plus(scaled(a, s.W), eye, -1) for a in bounds)
+    return _if(all(map(told.indefinite, forms)))
 
 
-def _leaves(case: Case, at: Fraction | None, face: tuple[str, str]) -> Outcome:
-    """The plan comes closer to a face of the safe set than the radius, near the time of the witness."""
-    if case.result.tube is None:
-        return stated(False, "no radius is stated")
-    if case.result.specification.coordinates:
-        return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
-    return _within_none(case, _least_radius(case, case.result.tube), at, face)
+def _leaves(told: _Told) -> Outcome:
+    """The plan, or the ball around it of the radius that is told, is beyond a face of the safe set at a time.
+
+    That radius is the certificate's own word: the ball must be beyond it at the least that it can have.
+    """
+    result, radius, least = told.case.result, Fraction(0), Fraction(0)
+    if told.claim == "tube_in_safe_set":
+        if result.specification.coordinates or result.tube is None:
+            return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
+        radius, least = result.tube.rho, _least_radius(told.case, result.tube)
+        told.same("radius", radius)
+    return _beyond(told, radius, least)
 
 
-def _within_none(case: Case, own: Fraction, at: Fraction | None, face: tuple[str, str]) -> Outcome:
-    """The plan, with a ball of radius `own` around it, is beyond a face of the safe set near a time."""
-    s, rho, family, (name, side) = case.system, exact(own), case.result.specification.trajectory, face
-    if name not in s.states:
-        return stated(False, "no such state is known")
-    least, most = s.safe_set[name]
+def _beyond(told: _Told, radius: Fraction, least: Fraction) -> Outcome:
+    """The plan, with `least` around it, is beyond the face that is told; the witness is `radius` beyond the plan."""
+    s, family = told.case.system, told.case.result.specification.trajectory
+    name, above = told.word("state", *s.states), told.word("side", "lower", "upper") == "upper"
+    i, (low, high), t = s.states.index(name), s.safe_set[name], told.moment
+    sign, limit = (1, high) if above else (-1, -low)
     if isinstance(family, AnyPlan):  # some plan of it is at each face of its box
-        low, high = family.x[name]
-        return _if(high + own > most if side == "upper" else low - own < least)
-    v = _near(case, at).middle()[1][s.states.index(name)]
-    return _if(bool(v + rho > exact(most)) if side == "upper" else bool(v - rho < exact(least)))
+        x = [exact((a + b) / 2) for a, b in family.x.values()]
+        x[i] = exact(family.x[name][above])
+    else:
+        x, _ = told.case.curve.at(t)
+    beyond = sign * x[i] - exact(limit)
+    if not beyond + exact(least) > 0:
+        return _if(False)
+    x[i] += sign * exact(radius)
+    told.close("excess", told.parameters["excess"], beyond + exact(radius), (low, high))
+    told.there(x)
+    return CONFIRMED
 
 
-def _too_wide(case: Case, told: object, at: Fraction | None, face: tuple[str, str]) -> Outcome:
-    """The half-width that is asked for is more than the plan leaves to a face of the safe set, near a time."""
-    asked = case.result.specification.half_widths.get(face[0])
-    if asked is None or told != asked:
-        return stated(False, "another half-width is asked for, or none")
-    return _within_none(case, asked, at, face)
+def _too_wide(told: _Told) -> Outcome:
+    """The half-width that is asked for is more than the plan leaves to a face of the safe set, at a time."""
+    asked = told.case.result.specification.half_widths
+    width = asked[told.word("state", *asked)]
+    told.same("half_width", width)
+    return _beyond(told, width, width)
 
 
-def _starts_outside(case: Case, name: str, told: object) -> Outcome:
+def _starts_outside(told: _Told) -> Outcome:
     """A state starts farther from the plan's than the half-width that is asked for."""
-    s, asked = case.system, case.result.specification.half_widths
-    if name not in s.states or name not in asked:
-        return stated(False, "no half-width is asked for")
-    if told != asked[name]:
-        return stated(False, "another half-width is asked for")
+    s, asked, off = told.case.system, told.case.result.specification.half_widths, told.parameters["off"]
+    name = told.word("state", *asked)
+    told.same("half_width", asked[name])
     if s.within is not None:
-        return _if(s.within > asked[name])
+        told.close("off", off, exact(s.within))
+        return _if(s.within > asked[name] and not told.x and not told.t)
     i = s.states.index(name)
-    most = exact(asked[name])
-    apart = [Program([start.off_plan(point, case.curve)[i]], ()).run(())[0] for point in start.points(s)]
-    return _if(any(bool(off > most) or bool(-off > most) for off in apart))
+    for point in start.points(s):
+        apart = abs(Program([start.off_plan(point, told.case.curve)[i]], ()).run(())[0])
+        if told.x == _shown(point) and not told.t:
+            told.close("off", off, apart)
+            return _if(bool(apart > exact(asked[name])))
+    raise _AnotherError("the witness is no start")
+
+
+def _shown(point: Sequence[Fraction]) -> Numbers:
+    """A point as it is told: in floats."""
+    return tuple(Fraction(repr(float(q))) for q in point)
+
+
+def _plan_exceeds(told: _Told) -> Outcome:
+    """u* of the plan is beyond a limit at the time of the witness; of a family nothing of the kind is known."""
+    spec, inputs = told.case.result.specification, told.case.system.inputs
+    if isinstance(spec.trajectory, AnyPlan):
+        raise _AnotherError("it is of no known plan")
+    name, side = told.word("input", *spec.limits), told.word("side", "lower", "upper")
+    low, high = ends = spec.limits[name]
+    told.same("limit", ends[side == "upper"])
+    if told.parameters.keys() > {"input", "side", "limit", "plan"}:
+        raise _AnotherError("it says what nothing examines")
+    x, u = told.case.curve.at(told.moment)
+    value = u[inputs.index(name)]
+    told.close("plan", told.parameters["plan"], value, ends)
+    told.there(x)
+    return _if(bool(value > exact(high)) if side == "upper" else bool(value < exact(low)))
+
+
+_FALSE: Mapping[str, Callable[[_Told], Outcome]] = {
+    "metric_definite": _not_positive,
+    "metric_contraction": _too_slow,
+    "metric_killing": _not_killing,
+    "metric_bound": _beyond_declared,
+    "tube_in_safe_set": _leaves,
+    "plan_in_safe_set": _leaves,
+    "half_width_fits": _too_wide,
+    "start_in_tube": _starts_outside,
+    "input_within_limits": _plan_exceeds,
+}
 
 
 def _least_radius(case: Case, tube: TubeSection) -> Fraction:
@@ -195,28 +296,6 @@ def _least_radius(case: Case, tube: TubeSection) -> Fraction:
     with ctx.workprec(SHARP):
         distance = Fraction(floor(start.offset(case.place)))
     return min(tube.rho, tube.epsilon + tube.rho_a + distance)
-
-
-def _near(case: Case, at: Fraction | None) -> Segment:
-    """A short segment of the plan near a time."""
-    t = 0.0 if at is None else float(at)
-    segment: Segment = case.curve.root
-    while segment.halves:
-        segment = min(segment.halves, key=lambda half: max(half.when[0] - t, t - half.when[1], 0.0))
-        if segment.when[1] - segment.when[0] < 1e-9:
-            break
-    return segment
-
-
-def _plan_exceeds(case: Case, name: str, at: Fraction | None) -> Outcome:
-    """u* of the plan is beyond a limit near the time of the witness; of a family nothing of the kind is known."""
-    spec, inputs = case.result.specification, case.system.inputs
-    if name not in spec.limits or isinstance(spec.trajectory, AnyPlan):
-        return stated(False, "it is no input with limits, or of no known plan")
-    low, high = spec.limits[name]
-    _, _, u = _near(case, at).middle()
-    value = u[inputs.index(name)]
-    return _if(bool(value > exact(high)) or bool(value < exact(low)))
 
 
 def _gains_fail(result: Result, name: str) -> Outcome:
@@ -231,15 +310,17 @@ def _gains_fail(result: Result, name: str) -> Outcome:
     return Outcome(verdict="undecided", why=why) if refused else stated(False, "no shortfall is stated")
 
 
-def excludes(spec: Specification) -> Outcome:
-    """Whether the rate that the specification asks for is excluded at one of the points that suggest themselves."""
-    plant = spec.plant
-    if not isinstance(spec.metric, Wanted) or spec.metric.rate is None:
-        return Outcome(verdict="undecided", why="no rate is asked for")
+def excludes(spec: Specification, reason: Reason) -> Outcome:
+    """Whether the rate that is asked for is excluded by the mode that is told, at a point that suggests itself."""
+    plant, failure = spec.plant, reason.parameters["failure"]
+    assert isinstance(failure, tuple)
+    kind, told = failure
+    if not isinstance(spec.metric, Wanted) or spec.metric.rate is None or kind != "uncontrollable_mode":
+        return Outcome(verdict="undecided", why="no rate is asked for, or there is no mode that excludes it")
     for point in _points(spec):
         if all(low <= x <= high for x, (low, high) in zip(point, plant.safe_set.values(), strict=True)):
-            linear = _linearised(plant, point)
-            if linear is not None and _has_slow_mode(*linear, spec.metric.rate):
+            linear = _linearised(plant, point) if reason.at in (None, (None, _shown(point))) else None
+            if linear is not None and _has_slow_mode(*linear, spec.metric.rate, **told):
                 return CONFIRMED
     return Outcome(verdict="undecided", why="no uncontrollable mode was found that excludes the rate")
 
@@ -282,8 +363,8 @@ def _linearised(plant: Plant, point: Sequence[Fraction]) -> tuple[fmpq_mat, fmpq
     return fmpq_mat(n, n, [columns[k][i, 0] for i in range(n) for k in range(n)]), B
 
 
-def _has_slow_mode(A: fmpq_mat, B: fmpq_mat, rate: Fraction) -> bool:
-    """Whether some uncontrollable mode s has Re s > -rate."""
+def _has_slow_mode(A: fmpq_mat, B: fmpq_mat, rate: Fraction, limit: Fraction, mode: Numbers) -> bool:
+    """Whether some uncontrollable mode s, about `mode`, has Re s > -rate, and Re s >= -limit but for rounding."""
     n = A.nrows()
     blocks = [B]
     for _ in range(n - 1):
@@ -308,4 +389,9 @@ def _has_slow_mode(A: fmpq_mat, B: fmpq_mat, rate: Fraction) -> bool:
     A_c = fmpq_mat(len(free), len(free), [image[i, k] for i in range(len(free)) for k in free])
     assert image == A_c * Z, "the left null space of the controllability matrix is invariant"
     roots: Any = A_c.charpoly().complex_roots()  # with multiplicities, which flint's types do not say
-    return any(bool(s.real + exact(rate) > 0) for s, _ in roots)
+    most, (real, imaginary) = min(rate, limit + _CLOSE * (1 + abs(limit))), map(exact, mode)
+    return any(
+        s.real + exact(most) > 0
+        and max(abs(s.real - real), abs(abs(s.imag) - imaginary)) <= exact(_ROUGH) * (1 + abs(s))
+        for s, _ in roots
+    )

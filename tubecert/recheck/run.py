@@ -14,7 +14,6 @@ from tubecert.recheck.cover import Claim, Memory, Outcome, stated, telling, time
 from tubecert.recheck.document import SAMPLED_LOOP, Node, read
 from tubecert.recheck.result import Certificate
 from tubecert.recheck.sampled_loop import claims as sampled_loop
-from tubecert.recheck.sampled_loop.record import NOT_EXAMINED
 from tubecert.recheck.sampled_loop.record import read_certificate as read_sampled_loop
 
 BUDGET = 200_000
@@ -106,7 +105,7 @@ def _read(document: Node, budget: int) -> tuple[str, str, tuple[str, ...], Calla
     """What a certificate of either format states, its hash, what is not examined, and its claims."""
     if document.mapping()["format"] == SAMPLED_LOOP:
         own = read_sampled_loop(document)
-        return own.verdict, own.stated_hash, NOT_EXAMINED, lambda: sampled_loop.of(own, budget)
+        return own.verdict, own.stated_hash, own.unread, lambda: sampled_loop.of(own, budget)
     certificate = read_certificate(document)
     unread = (*certificate.unread, *_refuted_beside(certificate))
     return certificate.result.verdict, certificate.stated_hash, unread, lambda: _claims(certificate, budget)

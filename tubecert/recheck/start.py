@@ -263,6 +263,6 @@ def _norms(place: Place, at_start: list[Matrix], limit: Fraction) -> Outcome:
     curve = place.curve
     still = curve
     if not curve.ranges:
-        still = Curve(curve.start, (), (Part(arb(0), arb(0), {}),), None, curve.start)
+        still = Curve(curve.start, (), (Part(Fraction(0), arb(0), {}),), None, curve.start)
     around = Tube(still, Round(s.within), s.states, (), s.ranges)
     return prove(norms_below(at_start, limit), around, place.budget)

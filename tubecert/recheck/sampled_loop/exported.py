@@ -13,7 +13,6 @@ import ast
 import math
 import re
 import stat
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from hashlib import sha256
@@ -23,7 +22,7 @@ from typing import Final
 
 from flint import arb, ctx
 
-from tubecert.recheck.balls import Ball, exact, floor, power
+from tubecert.recheck.balls import Ball, floor, power
 from tubecert.recheck.cover import Outcome, stated
 from tubecert.recheck.document import Node
 from tubecert.recheck.program import Program
@@ -187,17 +186,14 @@ class HeldPlan:
             rows = [[Ball(single(float(v.mid())), v.rad()) for v in row] for row in rows]
         return (_lines("xs", xs), _lines("us", us)), rows
 
-    def _at(self, t: Fraction) -> list[Ball]:
-        """x* and u* at a time, (n + m); where u* jumps, what it jumps to; of a family 0."""
-        curve, knots, horizon = self._course.curve, self._course.knots, self._course.spec.trajectory.horizon
+    def _at(self, t: Fraction) -> tuple[list[Ball], list[Ball]]:
+        """x* (n) and u* (m) at a time; of a family 0."""
+        curve, horizon = self._course.curve, self._course.spec.trajectory.horizon
         if self._course.family:
-            return [arb(0)] * (len(curve.x) + len(curve.u))
+            return [arb(0)] * len(curve.x), [arb(0)] * len(curve.u)
         if horizon is not None and not self._goes_on:
             t = t % horizon if self._course.spec.afterwards == "repeat" else min(t, horizon)
-        if knots is None:
-            return curve.field.at([exact(t)] if curve.field.variables else [])
-        k = min(bisect_right(knots.t, t), len(curve.parts)) - 1
-        return curve.field.with_values(curve.parts[k].values).at([exact(t - knots.t[k])])
+        return curve.at(t)
 
     def wrong(self, xs: Rows, us: Rows) -> str:
         """What is wrong with rows of the samples that are written, or with the formula; nothing if that is ""."""
@@ -205,9 +201,9 @@ class HeldPlan:
             return "the plan does not have a row for every sample"
         found = [*([Ball(v) for v in (*x, *u)] for x, u in zip(xs, us, strict=True)), *self._computed]
         samples = [*self.written, *(_LOOKED_AT if self._goes_on else ())]
-        n, period = len(self._course.curve.x), self._course.spec.hardware.sample_time
+        period = self._course.spec.hardware.sample_time
         with ctx.workprec(128):
-            wanted = [[*self._at(k * period)[:n], *self._at(k * period + self.lead)[n:]] for k in samples]
+            wanted = [[*self._at(k * period)[0], *self._at(k * period + self.lead)[1]] for k in samples]
         sizes = [max(0.0, *(floor(x.abs_lower()) for x in column)) for column in zip(*wanted, strict=True)]
         for k, row, own in zip(samples, found, wanted, strict=True):
             near = zip(row, own, sizes, strict=True)

@@ -20,7 +20,7 @@ from tubecert.recheck.specification import SampledSpecification, read_sampled_sp
 from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.specified.trajectory import Planned, Tabled
 
-NOT_EXAMINED = ("notes", "run", "spec.file_hash")
+_NOT_EXAMINED = ("notes", "run", "spec.file_hash")
 _PARTS = ("planned", "nominal", "controller", "tube", "recipe", "inputs", "clearance", "lacks")
 _BETWEEN = {"lags": (1, 50_000), "pieces": (1, 64), "panels": (1, 64), "windows": (1, 4_096)}
 _MOST_START = 1_000_000  # samples before the last stage
@@ -74,7 +74,10 @@ class Proven:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What is claimed, and `proven` where it is certified; the hash that is stated, and the one that it has."""
+    """What is claimed, and `proven` where it is certified; the hash that is stated, and the one that it has.
+
+    `unread`: members that no claim examines.
+    """
 
     verdict: str
     specification: SampledSpecification
@@ -82,6 +85,7 @@ class Certificate:
     repeated: Repeated
     stated_hash: str
     hash: str
+    unread: tuple[str, ...]
 
 
 def read_certificate(document: Node) -> Certificate:
@@ -113,6 +117,7 @@ def read_certificate(document: Node) -> Certificate:
         repeated=repeated,
         stated_hash=whole["hash"].text(),
         hash=digest(whole["result"].value),
+        unread=(*_NOT_EXAMINED, *(key for key in _PARTS if key in own and not certified)),
     )
 
 

@@ -97,10 +97,9 @@ class Course:
     @property
     def _end(self) -> tuple[list[Ball], list[Ball]]:
         """x* and u* at the end, of inputs that jump there those before."""
-        last, n = self.curve.parts[-1], len(self.curve.x)
-        field = self.curve.field.with_values(last.values)
-        found = field.at([last.length] if field.variables else [])
-        return found[:n], found[n:]
+        horizon = self.spec.trajectory.horizon
+        assert horizon is not None, "only then something may hold afterwards"
+        return self.curve.at(horizon)
 
     def windows(self, count: int) -> list[Window]:
         """About so many windows, or cells, that cover it."""
@@ -124,7 +123,7 @@ class Course:
             for lo, hi in pairwise([*(length * k / pieces for k in range(pieces)), length]):
                 found = iter(own.hull([(lo, hi)] if own.variables else []))
                 x, u, speed, steepness = (list(islice(found, size)) for size in (n, m, n, m))
-                yield Window(x, u, speed, steepness, part.start + between(lo, hi) if timed else None)
+                yield Window(x, u, speed, steepness, exact(part.start) + between(lo, hi) if timed else None)
 
     def defect(self) -> list[Ball]:
         """sup |x*_i' - F_i(x*, u*, p0)|, (n,), and |F_i| where the plan rests."""
