@@ -1,5 +1,6 @@
 """Sampled loops for tests of simulation, proven."""
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -51,7 +52,7 @@ def proven(name: str) -> Result:
     return result
 
 
-def setting(name: str, *changes: tuple[str, str], duration: str | None = None) -> Setting:
-    """Its setting; `changes` of the text make another plant, whose certificate is a lie."""
-    text = replaced(ABOUT[name][0], *changes)
-    return setting_of(load_text(text), proven(name), duration and Fraction(duration))
+def setting(name: str, *changes: tuple[str, str], duration: str | None = None, **claims: object) -> Setting:
+    """Its setting; `changes` of the text make another plant, and other `claims` a certificate that is a lie."""
+    text, result = replaced(ABOUT[name][0], *changes), replace(proven(name), **claims)
+    return setting_of(load_text(text), result, duration and Fraction(duration))

@@ -10,9 +10,8 @@ from loops import proven, setting
 from scipy.optimize import linprog
 
 from tubecert.simulation.sampled import campaign
-from tubecert.simulation.sampled.attack import Attack, worst_of
+from tubecert.simulation.sampled.attack import Attack, Lanes, goals, worst_of
 from tubecert.simulation.sampled.campaign import simulate
-from tubecert.simulation.sampled.kernels import goals
 from tubecert.simulation.sampled.loop import linear
 
 
@@ -52,23 +51,25 @@ def test_a_loop_without_remainders_is_driven_to_its_edge_and_not_beyond(name):
 def test_signals_and_starts_keep_to_their_bounds_however_small_kernels_are():
     """A long run forgets its start to 1e-170, whose squares are no numbers."""
     np.testing.assert_allclose(worst_of(np.array([[3e-170, -4e-170]]), True), [[0.6, -0.8]])
-    attack = Attack(setting=setting("pendulum", duration="3"), seed=0)
-    lanes = attack.lanes(0, len(attack.aims) + 20)
+    attack = Attack(setting("pendulum", duration="3"), seed=0)
+    lanes = Lanes(attack, range(len(attack.aims) + 20))
     starts = np.linalg.norm(lanes.off, axis=0)
     assert starts[lanes.aimed] == pytest.approx(0.02, rel=1e-12)
     assert starts.max() <= 0.02 * (1 + 1e-12)
     for k in (0, 1, 149):
-        assert np.linalg.norm(attack.noise(lanes, k), axis=0).max() <= 0.0005 * (1 + 1e-12)
+        assert np.linalg.norm(lanes.signals(k)[0], axis=0).max() <= 0.0005 * (1 + 1e-12)
 
 
 def sabotaged(how):
     """A loop whose certificate is a lie."""
     if how == "h":
         return setting("cart", ("0.2*sin", "0.3*sin"))
-    own = setting("cart")
+    result = proven("cart")
     if how == "sign":
-        return replace(own, tables=replace(own.tables, N=own.tables.N * [[1, -1]]))
-    return replace(own, bounds=0.9 * own.bounds)
+        return setting("cart", controller=replace(result.controller, N=result.controller.N * [[1, -1]]))
+    narrow = [{name: w * Fraction(9, 10) for name, w in own.half_widths.items()} for own in result.tube]
+    tube = (replace(own, half_widths=w) for own, w in zip(result.tube, narrow, strict=True))
+    return setting("cart", tube=tuple(tube))
 
 
 @pytest.mark.slow
@@ -78,10 +79,13 @@ def test_a_lie_is_found_with_seed_run_and_time(how):
     found = simulate(own, "hash", runs=20, seed=4)
     assert (found.outcome, found.summary["seed"]) == ("falsified", 4)
     first = found.violations[0]
-    run, attack = first.peak.run, Attack(setting=own, seed=4)
-    again = campaign.vector(attack, partial(linear, own.tables), range(run, run + 1)).found
-    assert again.peak_time[first.of][0] == first.peak.t
-    assert again.peak[first.of][0] == pytest.approx(first.peak.share, rel=1e-9)
+    run, attack = first.peak.run, Attack(own, seed=4)
+    again, of = (
+        campaign.vector(attack, partial(linear, own.tables), range(run, run + 1)),
+        own.names.index(first.of),
+    )
+    assert own.t[again.node[of, 0]] == first.peak.t
+    assert again.most[of, 0] == pytest.approx(first.peak.share, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -97,19 +101,16 @@ def test_what_is_finished_stays_and_the_same_seed_says_the_same(monkeypatch):
     own = setting("scalar")
     whole, some = simulate(own, "h", runs=60, seed=1), simulate(own, "h", runs=60, seed=1, report=stop)
     assert (some.outcome, some.runs, told) == ("interrupted", 64, [0, 32, 64])
-    np.testing.assert_array_equal(whole.arrays["share"][:, :64], some.arrays["share"])
+    np.testing.assert_array_equal(whole.share[:, :64], some.share)
     assert whole.summary["states"]["x"]["random_by_stage"]
-    assert (
-        simulate(own, "h", runs=60, seed=2).arrays["share"][:, 60:] != whole.arrays["share"][:, 60:]
-    ).any()
+    assert (simulate(own, "h", runs=60, seed=2).share[:, 60:] != whole.share[:, 60:]).any()
 
 
 @pytest.mark.slow
 def test_inputs_and_obstacles_are_judged_as_well():
     own = setting("cart")
     use = own.result.inputs[0]
-    narrow = replace(own.result, inputs=(replace(use, range=(Fraction(-1, 10), use.range[1])),))
-    near = replace(own, result=narrow)
+    near = setting("cart", inputs=(replace(use, range=(Fraction(-1, 10), use.range[1])),))
     assert simulate(near, "h", runs=0, seed=0).outcome == "falsified"
     assert simulate(own, "h", runs=0, seed=0).passed[0].distance > 1
     touched = setting("cart", ("center: [2, 0]", "center: [0.5, 0]"))

@@ -9,33 +9,34 @@ from loops import proven, setting
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from tubecert.simulation.lanes import follow
-from tubecert.simulation.sampled.attack import Attack
-from tubecert.simulation.sampled.families import course_of, courses
-from tubecert.simulation.sampled.loop import Sampled, linear
+from tubecert.simulation.sampled.attack import Attack, Lanes
+from tubecert.simulation.sampled.loop import Run, linear
+from tubecert.simulation.sampled.setting import course_of
 
 
-class Scripted(Attack):
-    """Lanes whose noise and wind are drawn beforehand, by samples; no slow signals."""
+class Scripted(Lanes):
+    """Three lanes whose noise and wind are drawn beforehand, by samples; no slow signals."""
 
-    def script(self, name, k):
-        return np.random.default_rng([k, len(name)]).uniform(-1, 1, (2, 3))
+    def __init__(self, own):
+        attack = Attack(own, seed=0)
+        super().__init__(attack, range(len(attack.aims), len(attack.aims) + 3))
+        self.own[:] = own.h is not None
 
-    def noise(self, lanes, k):
-        return self.script("noise", k)[: len(self.setting.spec.states)]
+    def noise(self, k):
+        return np.random.default_rng([k + 1, 5]).uniform(-1, 1, self.off.shape)
 
-    def wind(self, lanes, k, part):
-        return self.script("wind", k)[: self.setting.loop.E.shape[1]]
+    def wind(self, k):
+        return np.random.default_rng([k + 1, 4]).uniform(-1, 1, (self.setting.loop.E.shape[1], 3))
+
+    def signals(self, k, now=None):
+        parts = len(self.setting.lengths)
+        return self.noise(k), np.stack([self.wind(k)] * parts), np.zeros((len(self.setting.slow.size), 3))
 
 
-def run(own, course=None, level=1):
-    """Where three lanes are after every sample, what was found, the lanes, and who drives them."""
-    attack = Scripted(setting=own, seed=0)
-    lanes = attack.lanes(len(attack.aims), len(attack.aims) + 3)
-    lanes = lanes._replace(own=np.full(3, own.own is not None))
-    system = Sampled(attack, lanes, course or course_of(own), partial(linear, own.tables), 2**level)
-    found = follow(system)
-    return found.seen["x"][1:], lanes, attack
+def run(own, level=1):
+    """Where three lanes are after every sample, and the lanes."""
+    lanes = Scripted(own)
+    return Run(lanes, partial(linear, own.tables), 2**level).seen().x[1:], lanes
 
 
 @pytest.mark.slow
@@ -43,16 +44,16 @@ def run(own, course=None, level=1):
 def test_commands_act_after_their_delay_as_matrix_exponentials_say(delay):
     """Delays of 0, a half, 1 and 2.5 samples."""
     own = setting("cart", ("delay: 0.02", f"delay: {delay}"), ("0.2*sin(t)", "0"), duration="2")
-    path, lanes, attack = run(own)
+    path, lanes = run(own)
     Ts, tau, N = 0.05, float(delay), proven("cart").controller.N
     x = lanes.off
     commands: dict[int, np.ndarray] = {}
     for k in range(own.samples):
-        commands[k] = N @ (x + attack.noise(lanes, k))
+        commands[k] = N @ (x + lanes.noise(k))
         ends = sorted({0.0, tau % Ts, Ts})
         for begin, end in pairwise(ends):
             acting = int(np.floor((k * Ts + (begin + end) / 2 - tau) / Ts))
-            push = commands.get(acting, np.zeros((1, 3))) + attack.wind(lanes, k, 0)
+            push = commands.get(acting, np.zeros((1, 3))) + lanes.wind(k)
             both = expm(np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0]]) * (end - begin))
             x = (both @ np.vstack([x, push]))[:2]
         np.testing.assert_allclose(path[k], x, atol=1e-12)
@@ -62,14 +63,13 @@ def test_commands_act_after_their_delay_as_matrix_exponentials_say(delay):
 def test_a_nonlinear_plant_is_integrated_as_by_another_method():
     """And the error that is told is not below the true one."""
     own = setting("pendulum", duration="0.8")
-    draws = np.random.default_rng(1).random((3 * 3 + 2, 3))
-    course = courses(own, own.spec.trajectory.bundle, draws)
-    (coarse, _, _), (path, lanes, attack) = (run(own, course, level) for level in (0, 1))
+    (coarse, _), (path, lanes) = (run(own, level) for level in (0, 1))
+    course = lanes.course
     N, Ts = proven("pendulum").controller.N, 0.02
     g, commands, x = lanes.parameters[0], [np.zeros((1, 3))], course.x[0] + lanes.off
     for k in range(own.samples):
         plan = course.x[k * len(own.lengths)]
-        commands.append(N @ (x + attack.noise(lanes, k) - plan))
+        commands.append(N @ (x + lanes.noise(k) - plan))
         for late, begin, end in ((True, 0.0, 0.015), (False, 0.015, Ts)):
             u = (course.held[k] + commands[-2] if late else course.held[k + 1] + commands[-1])[0]
 
@@ -86,8 +86,8 @@ def test_a_nonlinear_plant_is_integrated_as_by_another_method():
 def test_plans_of_a_family_are_members_of_it():
     """x* in P, u* in Q with its rate, and what it misses of the dynamics within the defect; as long as they count."""
     own = setting("pendulum", duration="4")
-    bundle, dt = own.spec.trajectory.bundle, own.lengths
-    course = courses(own, bundle, np.random.default_rng(0).random((3 * 3 + 2, 50)))
+    dt = own.lengths
+    course = course_of(own, np.random.default_rng(0).random((3 * 3 + 2, 50)))
     assert np.mean(course.ends) > 0.95 * own.samples
     assert (abs(course.held) <= 0.3).all()
     assert abs(np.diff(course.held, axis=0)).max() <= 1 * own.Ts * (1 + 1e-9)

@@ -5,11 +5,9 @@ what they falsify. All runs are lanes of one numpy vector. Trusted: no.
 
 | module | what it does |
 |---|---|
-| `setting` | specification and certificate -> plant, times, tube, plan, all in floats |
-| `kernels` | what each signal does to a state, lag by lag, in the loop without remainders |
-| `families` | what lanes follow: the plan, or random plans of a family |
-| `attack` | the lanes: adversaries, who know the kernels, and random signals |
-| `loop` | samples, delay, held inputs; lanes as a system, and their steps |
+| `setting` | specification and certificate -> plant, times, tube, all in floats; the plan or plans that lanes follow |
+| `attack` | the lanes: adversaries, who know what each signal does lag by lag, and random signals |
+| `loop` | samples, delay, held inputs; lanes from start to end, in steps that are short enough |
 | `campaign` | lanes by vectors, what they come to, and its summary |
 | `figures` | the files of a campaign |
 """

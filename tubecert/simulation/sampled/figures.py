@@ -11,6 +11,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.simulation.figures import COLORS, TUBE, blank, images, labelled, names_of, plane, titled
 from tubecert.simulation.folder import npz
 from tubecert.simulation.sampled.campaign import Campaign
+from tubecert.simulation.sampled.setting import course_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,8 +22,11 @@ _BOXES: Final = 400  # cross-sections of the tube that are drawn
 
 def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     """Beside its summary, figures only of what was not interrupted; the same campaign gives the same bytes."""
-    arrays = {**campaign.arrays, "profile": campaign.profile, "aimed": campaign.aimed}
-    yield "runs.npz", npz(arrays | {"names": np.array(campaign.setting.names)})
+    own, found, node = campaign.setting, campaign.found, campaign.found.node[: len(campaign.share)]
+    bound = own.limits[node, np.arange(len(node))[:, None]]
+    peaks = {"share": campaign.share, "when": own.t[node], "value": campaign.share * bound, "bound": bound}
+    lanes = {"error": found.error, "aimed": campaign.aimed, "names": np.array(own.names)}
+    yield "runs.npz", npz({**peaks, **lanes, "profile": found.profile})
     if campaign.runs == campaign.asked:  # to draw takes longer than who is interrupted has
         yield from images(DRAWERS, campaign)
 
@@ -36,11 +40,11 @@ def _tube_use(campaign: Campaign) -> Figure:
     own = campaign.setting
     figure = blank(7.0, 0.9 + 1.5 * len(own.names))
     axes = figure.subplots(len(own.names), 1, sharex=True, squeeze=False)[:, 0]
-    t = np.arange(own.samples) * own.Ts
-    bounds = own.at(np.arange(own.samples))
+    each = slice(None, -1, len(own.lengths))  # sample
+    t, bounds = own.t[each], own.limits[each].T
     for i, (axis, name) in enumerate(zip(axes, own.names, strict=True)):
         axis.fill_between(t, 0, bounds[i], step="post", color=TUBE, alpha=0.25, lw=0, label="tube")
-        for (label, color), profile in zip(_GROUPS, campaign.profile, strict=True):
+        for (label, color), profile in zip(_GROUPS, campaign.found.profile, strict=True):
             axis.plot(t, profile[i] * bounds[i], color=color, lw=1.0, label=label)
         axis.set_ylabel(labelled(own.spec, name, f"|{name} - {name}*|"))
         axis.set_ylim(0, None)
@@ -58,13 +62,12 @@ def _plane(campaign: Campaign) -> Figure | None:
     i, j = (own.spec.states.index(name) for name in names)
     plan, boxes = None, list[Array]()
     if own.spec.trajectory.bundle is None:
-        plan = campaign.found[0].plan[:, [i, j]]
+        parts, corners = len(own.lengths), np.array([[1.0, 1], [1, -1], [-1, -1], [-1, 1]])
+        plan = course_of(own, np.zeros((0, 1))).x[::parts, [i, j], 0]
         shown = np.unique(np.linspace(0, own.samples - 1, _BOXES).astype(int))
-        corners: Array = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
-        boxes = [plan[k] + corners * own.at(k)[[i, j]] for k in shown]
+        boxes = [plan[k] + corners * own.limits[k * parts, [i, j]] for k in shown]
     figure, axis = plane(own.spec, names, boxes, plan)
-    path = campaign.found[0].path
-    axis.plot(path[:, i], path[:, j], color=COLORS["l1"], lw=0.5, alpha=0.5)
+    axis.plot(campaign.found.x[:, i], campaign.found.x[:, j], color=COLORS["l1"], lw=0.5, alpha=0.5)
     axis.plot([], [], color=COLORS["l1"], lw=0.5, label="some runs")
     axis.autoscale_view()
     titled(figure, axis, _title(campaign), 4)

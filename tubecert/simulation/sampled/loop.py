@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import ceil
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.record import Tables
-from tubecert.simulation.halving import Places
-from tubecert.simulation.lanes import SHARES, Found, Steps
 from tubecert.simulation.obstacles import in_plane, signed_distance
-from tubecert.simulation.sampled.attack import Attack, Lanes
-from tubecert.simulation.sampled.families import Course, course_of, courses
-from tubecert.simulation.sampled.setting import Setting
+from tubecert.simulation.plans import integrated
+from tubecert.simulation.sampled.attack import Lanes
+from tubecert.simulation.sampled.setting import Integers
 
-_PACE: Final = 0.15  # |A| times the length of a step of the first level
-_OUTPUTS: Final = 250  # times at which runs are compared, and drawn
+_PACE: Final = 0.15  # |A| times the length of a step, before steps are halved
+_HALVED: Final = 6  # times at most
+_ENOUGH: Final = 5e-3  # of a half-width, that a run may be wrong by
+_DRAWN: Final = 16  # of how many runs one is
 _LIMIT: Final = 100  # shares of what is proven, beyond which nobody is followed
 NOBODYS, DIVERGED = -1, 1  # why a lane is stopped: its plan is none of its family, or it is far outside
 
@@ -43,131 +43,123 @@ def linear(tables: Tables, lanes: int) -> Step:
     return step
 
 
-class Sampled:
-    """Some lanes in the steps of a level: a `lanes.System`. All parts of all samples have `count` steps.
+class Seen(NamedTuple):
+    """What N lanes leave behind, seen at nodes as long as nothing stopped them.
 
-    What is seen, at the ends of parts: `x`, `share` (n + m, N) of |x - x*| and of |u - u*| of the last command, that
-    command `u`, distances from obstacles `near` (O, N). `profile` (2, n + m, K): the largest share by sample, of random
-    lanes and of adversaries.
+    `most` (n + m + O + 2 m, N), and at which `node` of all: shares of |x - x*|, and of |u - u*| of the last command,
+    how far into obstacles, -u, u. Why a lane `stopped`, 0 if nothing did, and the `error` of the integration as a share
+    of a half-width, (N,). `x` (S, n, N) at `outputs`, of some. `profile` (2, n + m, K): the largest share by sample,
+    of random lanes and of adversaries.
     """
 
-    kept = ("x",)
+    most: Array
+    node: Integers
+    stopped: Integers
+    error: Array
+    x: Array
+    profile: Array
 
-    def __init__(self, attack: Attack, lanes: Lanes, course: Course, made: Controllers, count: int) -> None:
-        self._attack, self._own, self._lanes, self._course = attack, attack.setting, lanes, course
-        self._made, self._count, own = made, count, attack.setting
-        parts = (
-            np.array(own.nodes[:-1], dtype=float)[:, None] + own.lengths[:, None] * np.arange(count) / count
+
+def joined(parts: Sequence[Seen]) -> Seen:
+    """One for several; states are those of the first."""
+    found = Seen(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
+    return found._replace(x=parts[0].x, profile=np.max([part.profile for part in parts], axis=0))
+
+
+def resolved(lanes: Lanes, made: Controllers) -> Seen:
+    """What is seen in steps that are halved until no lane is wrong by much, or it is far outside twice.
+
+    An error is twice the difference to steps twice as long, mostly far above the true one; inf for what diverged.
+    """
+    own = lanes.setting
+    count = max(1, ceil(abs(own.loop.A).sum(axis=1).max() * own.lengths.max() / _PACE))
+    found, bounds = Run(lanes, made, count).seen(), own.limits[own.outputs, : own.loop.states, None]
+    for level in range(1, _HALVED + 1):
+        coarse, found = found, Run(lanes, made, count * 2**level).seen()
+        apart = np.nan_to_num(abs(found.x - coarse.x) / bounds).max(axis=(0, 1))  # nan: the plan is over
+        diverged = found.stopped == DIVERGED
+        found = found._replace(error=np.where(diverged, np.inf, 2 * apart))
+        if ((found.error <= _ENOUGH) | (diverged & (coarse.stopped == DIVERGED))).all():
+            break
+    return found._replace(x=found.x[..., ::_DRAWN])
+
+
+class Run:
+    """Some lanes from start to end, each part of a sample in `count` Runge-Kutta steps."""
+
+    def __init__(self, lanes: Lanes, made: Controllers, count: int) -> None:
+        own, N, shares = lanes.setting, len(lanes), len(lanes.setting.names)
+        beside = len(own.spec.obstacles) + 2 * own.loop.inputs
+        self._lanes, self._own, self._course, self._count = lanes, own, lanes.course, count
+        self._controller, (*_, self._slow) = made(N), lanes.signals(-1)
+        self._added = [np.zeros((own.loop.inputs, N))] * (own.loop.whole + 2)  # by commands, the last first
+        self._found = Seen(
+            most=np.append(np.zeros((shares, N)), np.full((beside, N), -np.inf), axis=0),
+            node=np.zeros((shares + beside, N), dtype=np.int64),
+            stopped=np.zeros(N, dtype=np.int64),
+            error=np.full(N, np.inf),
+            x=np.full((len(own.outputs), own.loop.states, N), np.nan),
+            profile=np.zeros((2, shares, own.samples)),
         )
-        start = np.append(np.add.outer(np.arange(own.samples) * own.Ts, parts.ravel()), own.samples * own.Ts)
-        length = np.append(np.tile(np.repeat(own.lengths / count, count), own.samples), 0.0)
-        self.steps = Steps(start, length, outputs(own) * parts.size)
-        self.profile = np.zeros((2, len(own.names), own.samples))
+        self._shown = dict(zip(own.outputs.tolist(), self._found.x, strict=True))
 
-    def start(self) -> Array:
-        """x (n, N) at the start."""
-        N = len(self._lanes.number)
-        self.stopped = np.zeros(N, dtype=np.int64)
-        self._controller, self._goal = self._made(N), self._attack.sent(self._lanes, -1)
-        nothing = np.zeros((self._own.loop.inputs, N))
-        self._queue = [nothing] * (
-            self._own.loop.whole + 2
-        )  # what commands add to the plan's, the last one first
-        return np.asarray(self._course.x[0] + self._lanes.off)
+    def seen(self) -> Seen:
+        """Node after node, until nobody goes on."""
+        own, x, last = self._own, self._course.x[0] + self._lanes.off, len(self._own.t) - 1
+        with np.errstate(all="ignore"):
+            for node in range(last):
+                k, part = divmod(node, len(own.lengths))
+                if part == 0:
+                    self._sample(k, x)
+                self._look(node, k, x)
+                if self._found.stopped.all():
+                    return self._found
+                x = self._moved(k, part, x)
+            self._look(last, own.samples - 1, x)
+        return self._found
 
-    def at(self, step: int, stage: int, x: Array) -> Array:
-        """f + B (u + h) + E w, (n, N)."""
-        node, inner = divmod(step, self._count)
-        if stage == 0 and inner == 0 and step < len(self.steps.start) - 1:
-            self._enter(*divmod(node, len(self._own.lengths)), x)
-        own, t = self._own, float(self.steps.start[step] + SHARES[stage] * self.steps.length[step])
-        now, goal = self._ramp
-        forces = self._pushes + own.spread @ (now + (t / own.Ts - self._sample) * (goal - now))
-        m = own.loop.inputs
-        if self._course.inputs is not None:
+    def _sample(self, k: int, x: Array) -> None:
+        """The computer reads its sensors, and its command is sent."""
+        own, course, now, stopped = self._own, self._course, self._slow, self._found.stopped
+        noise, self._winds, self._slow = self._lanes.signals(k, now)
+        self._ramp = now, self._slow - now
+        self._planned = course.held[k + own.loop.whole + 1]
+        sent = self._controller(x + noise, course.x[k * len(own.lengths)], self._planned)
+        self._added = [sent - self._planned, *self._added[:-1]]
+        stopped[(stopped == 0) & (k >= course.ends)] = NOBODYS
+
+    def _moved(self, k: int, part: int, x: Array) -> Array:
+        """The states (n, N) after a part of sample k."""
+        own, late = self._own, part < self._own.acts
+        held = 0.0 if self._course.inputs else self._course.held[k if late else k + 1]
+        pushes = np.vstack([held + self._added[own.loop.whole + late], self._winds[part]])
+        length = float(own.lengths[part])
+        return integrated(partial(self._slope, k, pushes), float(own.nodes[part]), x, length, self._count)
+
+    def _slope(self, k: int, pushes: Array, s: float, x: Array) -> Array:
+        """f + B (u + h) + E w at a time s of sample k, (n, N)."""
+        own, (now, further), shape = self._own, self._ramp, x.shape[1:]
+        m, t = own.loop.inputs, k * own.Ts + s
+        forces = pushes + own.spread @ (now + s / own.Ts * further)
+        if self._course.inputs:
             forces[:m] += self._course.inputs(t)
-        if own.own is not None:
-            h = own.own.run_floats_silenced([*x, np.full(1, t)], x.shape[1:])
+        if own.h is not None:
+            h = own.h.run_floats_silenced([*x, np.full(1, t)], shape)
             forces[:m] += np.where(self._lanes.own, h, 0.0)
-        return own.plant.run_floats_silenced([*x, *self._lanes.parameters, *forces], x.shape[1:])
+        return own.plant.run_floats_silenced([*x, *forces, *self._lanes.parameters], shape)
 
-    def _enter(self, k: int, part: int, x: Array) -> None:
-        """What acts in a part of sample k; at its start the computer reads its sensors."""
-        own, course, attack, lanes = self._own, self._course, self._attack, self._lanes
-        if part == 0:
-            self._sample, now = k, self._goal
-            self._goal = attack.sent(lanes, k, now)
-            self._ramp = now, self._goal
-            self._planned = course.held[k + own.loop.whole + 1]
-            measured = x + attack.noise(lanes, k)
-            delta = self._controller(measured, course.x[k * len(own.lengths)], self._planned) - self._planned
-            self._queue = [delta, *self._queue[:-1]]
-            self.stopped[(self.stopped == 0) & (k >= course.ends)] = NOBODYS
-        late = part < own.acts
-        held = 0.0 if course.inputs is not None else course.held[k if late else k + 1]
-        pushed = held + self._queue[own.loop.whole + late]
-        self._pushes = np.vstack([pushed, attack.wind(lanes, k, part)])
-
-    def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
-        """What is seen at the start of a step; within a part what was seen before."""
-        node, inner = divmod(step, self._count)
-        if inner == 0:
-            own, spec, delta = self._own, self._own.spec, self._queue[0]
-            share = np.vstack([abs(x - self._course.x[node]), abs(delta)]) / own.at(self._sample)[:, None]
-            share = np.nan_to_num(share, nan=np.inf)
-            self.stopped[(self.stopped == 0) & (share.max(axis=0) > _LIMIT)] = DIVERGED
-            live, aimed = self.stopped == 0, self._lanes.aimed
-            for profile, group in zip(
-                self.profile[..., self._sample], (live & ~aimed, live & aimed), strict=True
-            ):
-                np.maximum(profile, np.where(group, share, 0.0).max(axis=1), out=profile)
-            gaps = [signed_distance(obstacle, in_plane(spec, obstacle, x.T)) for obstacle in spec.obstacles]
-            near = np.array(gaps).reshape(-1, x.shape[1])
-            self._seen = {"x": x, "share": share, "u": self._planned + delta, "near": near}
-        return self._seen
-
-    def step(self, step: int) -> float:
-        """Nothing goes on beside x."""
-        return 0.0
-
-    def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
-        """What peaks are taken of: shares by state and input, and how near obstacles are, the less the larger."""
-        shares = {name: rows["share"][:, i] for i, name in enumerate(self._own.names)}
-        return shares | {gap(i): -rows["near"][:, i] for i in range(rows["near"].shape[1])}
-
-
-def gap(obstacle: int) -> str:
-    """The name of the peak of an obstacle."""
-    return f"obstacle {obstacle}"
-
-
-def outputs(setting: Setting) -> NDArray[np.int64]:
-    """Numbers of the samples at whose start runs are compared, (K,), and of the one after the last."""
-    return np.unique(np.linspace(0, setting.samples, _OUTPUTS + 1).astype(np.int64))
-
-
-class Vector:
-    """Lanes of an attack, whose steps can be made shorter: a `halving.Vector`."""
-
-    def __init__(self, attack: Attack, lanes: Lanes, made: Controllers) -> None:
-        own, bundle = attack.setting, attack.setting.spec.trajectory.bundle
-        self._attack, self._lanes, self._made, self.N = attack, lanes, made, len(lanes.number)
-        self.course = course_of(own) if bundle is None else courses(own, bundle, lanes.draws.plan)
-        self.times = np.asarray(outputs(own) * own.Ts, dtype=float)
-        self.profile = np.zeros((2, len(own.names), own.samples))
-        size = float(abs(own.loop.A).sum(axis=1).max() * own.lengths.max())
-        self._count = max(1, ceil(size / _PACE))
-
-    def system(self, lanes: Places, level: int) -> Sampled:
-        """Some of the lanes at a level."""
-        own, course = self._lanes.of(lanes), self.course.of(lanes)
-        system = Sampled(self._attack, own, course, self._made, self._count * 2**level)
-        self.profile = system.profile if len(lanes) == self.N else np.maximum(self.profile, system.profile)
-        return system
-
-    def apart(self, lanes: Places, finer: Found, coarser: Found) -> tuple[Array, Array]:
-        """Differences of states in shares of what is proven; lanes whose plan is over are not apart."""
-        own = self._attack.setting
-        bounds = own.at(np.minimum(outputs(own), own.samples - 1)).T[:, : own.loop.states, None]
-        shares = abs(finer.seen["x"] - coarser.seen["x"]) / bounds
-        return np.nan_to_num(shares).max(axis=1), np.zeros(shares.shape[2])
+    def _look(self, node: int, k: int, x: Array) -> None:
+        """Keeps what is seen of the lanes that go on, at a node of sample k."""
+        own, found, delta, aimed = self._own, self._found, self._added[0], self._lanes.aimed
+        off = np.vstack([abs(x - self._course.x[node]), abs(delta)])
+        share = np.nan_to_num(off / own.limits[node, :, None], nan=np.inf)
+        found.stopped[(found.stopped == 0) & (share.max(axis=0) > _LIMIT)] = DIVERGED
+        live, u = found.stopped == 0, self._planned + delta
+        for profile, group in zip(found.profile[..., k], (live & ~aimed, live & aimed), strict=True):
+            np.maximum(profile, np.where(group, share, 0.0).max(axis=1), out=profile)
+        into = [-signed_distance(each, in_plane(own.spec, each, x.T)) for each in own.spec.obstacles]
+        seen = np.vstack([share, *into, -u, u])
+        higher = live & (seen > found.most)
+        found.most[higher], found.node[higher] = seen[higher], node
+        if node in self._shown:
+            self._shown[node][:, live] = x[:, live]
