@@ -7,7 +7,19 @@ from fractions import Fraction
 import proven
 import pytest
 from flint import ctx
-from rechecked import belongs_to, case_of, certified, digest, examine, failing, respecified, sealed, shipped
+from rechecked import (
+    belongs_to,
+    case_of,
+    certified,
+    digest,
+    doubted,
+    examine,
+    failing,
+    respecified,
+    sealed,
+    shipped,
+    unconfirmed,
+)
 from systems import BLOWN, SCALAR, SMALL
 
 from tubecert import spec
@@ -60,6 +72,62 @@ def test_a_metric_that_was_asked_for_is_not_any_metric(tmp_path):
         forged = copy.deepcopy(made)
         forged["result"]["synthesis"]["asked"] |= asked
         assert examine(sealed(forged), 100).exit_code == ExitCode.NOT_CERTIFIED
+
+
+ASKED = {  # of a metric in y alone, of degree 2 at most
+    "another state": {"variables": ["x"]},
+    "no state": {"variables": []},
+    "a lower degree": {"degree": "1"},
+    "what is no state": {"variables": ["y", "z"]},
+    "too large a degree": {"degree": "9"},
+    "an objective that there is not": {"objective": "fun"},
+    "an objective that searches for the rate": {"objective": "rate"},
+    "outputs of another objective": {"outputs": ["x"]},
+    "outputs that there are not": {"objective": "tube", "outputs": ["w"]},
+    "a route that there is not": {"route": "guessed"},
+    "a solver that there is not": {"solver": "mosek"},
+    "coordinates that there are not": {"coordinates": "polar"},
+}
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """A certificate of a metric that was written down, told as one that was asked for."""
+    turned = 'metric: {rate: 0.5, dual_metric: [["2 + y**2/100", "-0.3"], ["-0.3", 2]]}'
+    made = certified(SMALL.replace("[[0], [1]]", "[[1], [0]]").replace(GIVEN, turned), conditions="distance")
+    made["result"]["synthesis"] = {
+        "asked": {"rate": "0.5", "objective": "condition", "degree": "2", "variables": ["y"]}
+        | {"route": "auto", "solver": "clarabel"}
+    }
+    return made
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [None, *ASKED])
+def test_a_metric_is_told_to_be_asked_for_as_it_is(bent, name):
+    forged = copy.deepcopy(bent)
+    forged["result"]["synthesis"]["asked"] |= ASKED.get(name, {})
+    assert unconfirmed(forged) is (name is not None)
+
+
+@pytest.mark.slow
+def test_a_metric_that_was_not_found_is_the_one_that_was_asked_for():
+    """Every word of it: where only rates were compared, a search of another degree could be told."""
+    unreached = SMALL.replace('"-x + y"', '"-x + x*y"')
+    made = certified(unreached.replace(GIVEN, "metric: {synthesise: {rate: 1.5, degree: 0}}"))
+    assert made["result"]["verdict"] == "refuted"
+    said = made["result"]["synthesis"]["asked"]
+    assert not doubted(made)
+    for key, value in (
+        ("degree", "4"),
+        ("degree", "auto"),
+        ("variables", ["y"]),
+        ("route", "sos"),
+        ("solver", "scs"),
+    ):
+        forged = copy.deepcopy(made)
+        forged["result"]["synthesis"]["asked"] = said | {key: value}
+        assert unconfirmed(forged), key
 
 
 def planned():

@@ -93,7 +93,9 @@ def read_result(node: Node) -> Result:
         declared=_declared(own["declared"]),
         reasons=tuple(read_reason(item, len(states)) for item in own["reasons"].entries()),
         recipes=_recipes(own["proof"], sections),
-        synthesised=own.get("synthesis", lambda item: read_wanted(item.closed("asked")["asked"])),
+        synthesised=own.get(
+            "synthesis", lambda item: read_wanted(item.closed("asked")["asked"], specification.plant)
+        ),
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, specification.plant)),
         clearance=own.get("clearance", each(lambda item: item.record(Cleared))) or (),

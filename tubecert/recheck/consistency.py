@@ -16,6 +16,7 @@ from tubecert.recheck import clearances, inputs
 from tubecert.recheck.cover import CONFIRMED, Outcome, stated
 from tubecert.recheck.document import Enclosure
 from tubecert.recheck.kinds.table import KINDS
+from tubecert.recheck.monomials import degree
 from tubecert.recheck.reasons import Assumption
 from tubecert.recheck.result import Claim, Geodesics, Plans, Result, TubeSection, Wind
 from tubecert.recheck.specification import Specification
@@ -23,6 +24,7 @@ from tubecert.recheck.specified.loop import LETTERS, Disturbance
 from tubecert.recheck.specified.plant import Metric, Wanted
 from tubecert.recheck.specified.trajectory import AnyPlan, Planned, Resting, Tabled
 from tubecert.recheck.system import System
+from tubecert.recheck.terms import names
 from tubecert.recheck.times import period_of
 
 _CLAIMS_ONLY = "the verdict is certified, but"
@@ -98,12 +100,17 @@ def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
 
 
 def _synthesised(result: Result) -> Iterator[tuple[bool, str]]:
-    """A metric that was synthesised is what was asked for: its rate, and how ill-conditioned it may be."""
-    asked, metric = result.synthesised, result.metric
-    if isinstance(result.specification.metric, Wanted):
-        yield asked == result.specification.metric, "synthesis.asked is not what the specification asks for"
+    """A metric that was synthesised is what was asked for: rate, states, degree, how ill-conditioned it may be."""
+    asked, metric, own = result.synthesised, result.metric, result.specification.metric
+    if isinstance(own, Wanted):
+        yield asked == own, "synthesis.asked is not what the specification asks for"
     if asked is None:
         return
+    if isinstance(own, Metric):
+        flat = [e for row in own.dual for e in row]
+        within = asked.variables is None or names(flat) <= set(asked.variables)
+        yield within, "the metric depends on states that were not asked for"
+        yield asked.degree is None or degree(flat) <= asked.degree, "the degree of the metric is too large"
     yield result.overrides.metric is None, "a metric was given, and yet one was synthesised"
     if metric is None:
         return

@@ -146,6 +146,14 @@ def expanded(
     return factors, [_written(value[term], relations) for term in outputs]
 
 
+def degree(outputs: Sequence[Term]) -> float:
+    """The largest degree of polynomials in variables, waves and what else counts as a factor; infinite if too long."""
+    found = expanded(outputs)
+    if found is None:
+        return 0 if all(term.op == "const" for term in outputs) else inf
+    return max((sum(n for _, n in monomial) for p in found[1] for monomial in p), default=0)
+
+
 def _factor(term: Term) -> Term | None:
     """What a term contributes as a factor: itself, one over the base of its divisor, or nothing."""
     if term.op in ("const", "add", "mul") or (term.op == "pow" and _exponent(term) > 0):

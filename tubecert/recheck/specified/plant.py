@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from tubecert.recheck.document import Node
+from tubecert.recheck.document import Node, digest
 from tubecert.recheck.grammar import Owed, is_name
 from tubecert.recheck.lookup import Table
 from tubecert.recheck.specified.numbers import (
@@ -18,6 +19,7 @@ from tubecert.recheck.specified.numbers import (
     ends,
     not_negative,
     positive,
+    whole,
 )
 from tubecert.recheck.terms import Matrix, Term, names, number, number_of, replaced, slopes
 
@@ -219,16 +221,22 @@ class Metric:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A metric that is still to be found: at this rate, if one is given."""
+    """A metric that is still to be found: at this rate, of this degree and in these states, if one says so.
+
+    `content`: a hash of all that is asked for.
+    """
 
     rate: Fraction | None
     condition_number: Fraction | None
+    degree: int | None
+    variables: tuple[str, ...] | None
+    content: str
 
 
 def read_metric(node: Node, plant: Plant) -> Metric | Wanted:
     """`metric`."""
     if "synthesise" in node.mapping():
-        return read_wanted(node.closed("synthesise")["synthesise"])
+        return read_wanted(node.closed("synthesise")["synthesise"], plant)
     own = node.closed("dual_metric", "rate", optional=("bounds",))
     n = len(plant.states)
     reader = Reader.of(plant.states)
@@ -246,14 +254,29 @@ def read_metric(node: Node, plant: Plant) -> Metric | Wanted:
     )
 
 
-def read_wanted(node: Node) -> Wanted:
-    """What a metric that is to be synthesised must be; how it is searched for is idle."""
+_OBJECTIVES = {"condition": True, "margin": True, "rate": False, "adaptation": None, "tube": None}
+"""What a metric may be best in, and whether that is at a rate that is given: None says either."""
+
+_SOLVER = re.compile(r"clarabel|scs|cvxpy:[A-Z][A-Z0-9_]{0,31}")
+_MOST_DEGREE = 8
+
+
+def read_wanted(node: Node, plant: Plant) -> Wanted:
+    """What a metric that is to be synthesised must be, and how it is searched for."""
     keys = ("objective", "degree", "variables", "route", "solver")
     own = node.closed(*keys, optional=("rate", "condition_number", "coordinates", "outputs"))
-    own.get("coordinates", Node.text)
-    own.get("outputs", Node.texts)
-    for key in ("objective", "degree", "route", "solver"):
-        own[key].text()
-    if own["variables"].value != "auto":
-        own["variables"].texts()
-    return Wanted(own.get("rate", positive), own.get("condition_number", positive))
+    objective, outputs = own["objective"].word(*_OBJECTIVES), own.get("outputs", Node.texts)
+    own.get("coordinates", lambda item: item.word("auto", "identity"))
+    own["route"].word("auto", "sos", "cegis")
+    if not _SOLVER.fullmatch(own["solver"].text()):
+        raise own["solver"].refused("is no solver")
+    degree = None if own["degree"].value == "auto" else whole(own["degree"])
+    variables = None if own["variables"].value == "auto" else own["variables"].texts()
+    if not set(variables or ()) <= set(plant.states) or (degree or 0) > _MOST_DEGREE:
+        raise node.refused("asks for a metric of no such states, or of too large a degree")
+    if not set(outputs or ()) <= plant.lengths.keys() or (outputs is not None and objective != "tube"):
+        raise node.refused("asks for a small tube in what has no length, or for something else beside it")
+    if _OBJECTIVES[objective] not in (None, "rate" in own):
+        raise node.refused("has a rate where it is searched for, or none where one is needed")
+    rate, condition_number = own.get("rate", positive), own.get("condition_number", positive)
+    return Wanted(rate, condition_number, degree, variables, digest(node.value))
