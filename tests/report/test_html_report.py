@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 
 import certificates
@@ -35,7 +36,7 @@ from tubecert.pipeline import Options
 from tubecert.records import from_json
 from tubecert.report import html, markdown
 from tubecert.report.certificate_page import page_of
-from tubecert.report.figures_axes import Axis, _hexagon, number
+from tubecert.report.figures_axes import Axis, _corners, _hull, number
 from tubecert.report.figures_file import painted
 from tubecert.spec import load, load_text
 
@@ -298,35 +299,34 @@ def test_which_figures_there_are(orbit, regulated, outside):
     assert set(figures(outside)) == over_time | {"tube-0-1", "tube-0-2", "tube-1-2"}
 
 
-def swept(drawing):
-    """How far the shape that is swept along the plan goes in each direction, in viewport units."""
-    (group,) = (g for g in drawing.iter("g") if g.get("transform", "").startswith("matrix"))
-    a, b, c, d, *_ = map(float, group.get("transform")[7:-1].split())
-    radius = float(group[0].get("stroke-width")) / 2
-    return radius * math.hypot(a, c), radius * math.hypot(b, d)
+def places(path):
+    """The corners of all parts of a mark, (K, 2)."""
+    return np.array(points(path))
+
+
+def marked(drawing, style):
+    (mark,) = (x for x in drawing.iter("path") if x.get("class") == style)
+    return places(mark)
 
 
 def units(drawing, page_certificate, names):
     """Viewport units per unit of each of two states."""
-    (safe,) = (x for x in drawing.iter("rect") if x.get("class") == "safe")
     ranges = [page_certificate["result"]["safe_set"][name] for name in names]
-    sizes = float(safe.get("width")), float(safe.get("height"))
+    sizes = np.ptp(marked(drawing, "safe"), axis=0)
     return [size / (float(high) - float(low)) for size, (low, high) in zip(sizes, ranges, strict=True)]
 
 
 def test_the_tube_of_a_constant_metric_is_an_ellipse_as_wide_as_its_half_widths(orbit):
     drawing = drawn(orbit, "tube-0-1")
-    plan = plan_of(drawing)
-    (safe,) = (x for x in drawing.iter("rect") if x.get("class") == "safe")
-    low = orbit["result"]["safe_set"]["x1"][0]
-    unit = units(drawing, orbit, ("x1", "x2"))
+    plan, tube, safe = places(plan_of(drawing)), marked(drawing, "tube"), marked(drawing, "safe")
+    (low, _), unit = orbit["result"]["safe_set"]["x1"], units(drawing, orbit, ("x1", "x2"))
     widths = orbit["result"]["tube"]["half_widths"]
-    for reach, each, name in zip(swept(drawing), unit, ("x1", "x2"), strict=True):
-        assert reach == pytest.approx(widths[name] * each, rel=1e-4), "dbar sqrt(W_ii)"
-    places = points(plan)
-    x = [row[0] for row in orbit["notes"]["plan"]["samples"]["x"]]
-    for place, value in zip(places, x, strict=True):
-        assert place[0] == pytest.approx(float(safe.get("x")) + (value - low) * unit[0], abs=0.02)
+    for i, (each, name) in enumerate(zip(unit, ("x1", "x2"), strict=True)):
+        for side in (np.min, np.max):
+            reach = abs(side(tube[:, i]) - side(plan[:, i]))
+            assert reach == pytest.approx(widths[name] * each, abs=0.25), "dbar sqrt(W_ii)"
+    x = np.array([row[0] for row in orbit["notes"]["plan"]["samples"]["x"]])
+    assert np.allclose(plan[:, 0], safe[:, 0].min() + (x - low) * unit[0], atol=0.02)
 
 
 def test_every_state_over_time_has_its_half_width(orbit):
@@ -346,12 +346,14 @@ def test_every_state_over_time_has_its_half_width(orbit):
 
 def test_an_obstacle_lies_where_it_is_whatever_the_order_of_its_states(orbit):
     drawing = drawn(orbit, "tube-0-1")
-    (disc,) = (x for x in drawing.iter("ellipse") if x.get("class") == "obstacle")
-    (safe,) = (x for x in drawing.iter("rect") if x.get("class") == "safe")
-    low, high = orbit["result"]["safe_set"]["x1"]
-    unit = float(safe.get("width")) / (high - low)
-    assert float(disc.get("cx")) == pytest.approx(float(safe.get("x")) + (3 - low) * unit, abs=0.02)
-    assert float(disc.get("rx")) == pytest.approx(unit / 2, abs=0.02)
+    disc, safe, (unit, _) = (
+        marked(drawing, "obstacle"),
+        marked(drawing, "safe"),
+        units(drawing, orbit, ("x1", "x2")),
+    )
+    low, _ = orbit["result"]["safe_set"]["x1"]
+    assert disc[:, 0].mean() == pytest.approx(safe[:, 0].min() + (3 - low) * unit, abs=0.02)
+    assert np.ptp(disc[:, 0]) == pytest.approx(unit, abs=0.04)
     assert ("obstacle", "obstacle") in figures(orbit)["tube-0-1"].legend
 
 
@@ -393,16 +395,28 @@ _coordinates = st.integers(-20, 20).map(float)
 _points = st.tuples(_coordinates, _coordinates)
 
 
-@given(_points, _points, st.tuples(st.integers(1, 5).map(float), st.integers(1, 5).map(float)))
-def test_the_hull_of_two_rectangles(one, other, sides):
-    hull = _hexagon(one, other, sides)
-    edges = list(zip(hull, hull[1:] + hull[:1], strict=True))
-    signs = [(a, b) for a in (-1, 1) for b in (-1, 1)]
-    corners = [(x + a * sides[0], y + b * sides[1]) for x, y in (one, other) for a, b in signs]
-    assert set(hull) <= set(corners)
-    for (x0, y0), (x1, y1) in edges:
-        turns = [(x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) for x, y in corners]
-        assert min(turns) >= 0, "every corner lies to the left of every edge: convex, complete"
+@given(_points, _points, st.integers(1, 5), st.integers(1, 5), st.integers(-4, 4))
+def test_the_hull_of_a_shape_at_two_places(one, other, wide, high, tilt):
+    """Every point of both shapes lies to the left of every edge, and every corner is one of theirs."""
+    shape = np.array([(wide, tilt), (tilt, high + 20), (-wide, -tilt), (-tilt, -high - 20)], dtype=float)
+    both = np.concatenate([shape + one, shape + other])
+    hull = _hull(shape, np.array(one), np.array(other))
+    assert {*map(tuple, hull)} <= {*map(tuple, both)}
+    edges = np.roll(hull, -1, axis=0) - hull
+    for start, (x, y) in zip(hull, edges, strict=True):
+        away = both - start
+        assert (x * away[:, 1] - y * away[:, 0]).min() >= -1e-9
+
+
+@given(st.lists(_points, min_size=2, max_size=12))
+def test_what_is_left_out_of_a_curve_lies_beside_the_line(corners):
+    curve = np.array(corners)
+    kept = _corners(curve)
+    assert (kept[0], kept[-1]) == (0, len(curve) - 1)
+    for first, last in pairwise(kept):
+        along, off = curve[last] - curve[first], curve[first : last + 1] - curve[first]
+        share = np.clip(off @ along / max(along @ along, 1e-300), 0, 1)
+        assert np.abs(off - share[:, None] * along).max() <= 1 + 1e-9
 
 
 @given(st.floats(-1e5, 1e5))
@@ -522,22 +536,22 @@ def test_a_page_goes_well_with_the_certificate_on_stdout(folder, proven):
 @pytest.mark.slow
 def test_figures_are_files_for_a_paper(orbit, tmp_path):
     """The tube is as wide in the PNG as in the drawing, in its colour; a PDF has fonts, and the caption says all."""
-    figure = figures(orbit)["tube-0-1"]
+    chart = figures(orbit)["tube-0-1"]
     import matplotlib.pyplot as plt
 
-    image = plt.imread(io.BytesIO(painted("png", figure)))[..., :3]
-    unit = image.shape[1] / 400
-    image = image[: round(unit * (26 + float(pages.ET.fromstring(figure.svg).get("viewBox").split()[3])))]
+    image = plt.imread(io.BytesIO(painted("png", chart)))[..., :3]
+    ground = np.abs(image - np.array([0xEB, 0xE3, 0xE1]) / 255).max(axis=2) < 0.02  # what is not safe
+    rows, columns = (np.flatnonzero(ground.sum(axis=i) > 40) for i in (1, 0))  # and not an edge of a text
     colored = np.abs(image - np.array([0xA8, 0xCA, 0xEC]) / 255).max(axis=2) < 0.02
-    drawing = pages.ET.fromstring(figure.svg)
-    wide = max(x for x, _ in points(plan_of(drawing))) - min(x for x, _ in points(plan_of(drawing)))
-    found = np.flatnonzero(colored.any(axis=0))
-    assert (found[-1] - found[0]) / unit == pytest.approx(wide + 2 * swept(drawing)[0], abs=3)
-    data = painted("pdf", figure)
+    found = np.flatnonzero(colored[rows[0] : rows[-1]].any(axis=0))  # and not of the legend
+    tube = [x for mark in chart.marks if mark.style == "tube" for part in mark.parts for x, _ in part]
+    share = (max(tube) - min(tube)) / (chart.x.high - chart.x.low)
+    assert np.ptp(found) / np.ptp(columns) == pytest.approx(share, abs=0.01)
+    data = painted("pdf", chart)
     assert data.startswith(b"%PDF")
-    assert data == painted("pdf", figure)
+    assert data == painted("pdf", chart)
     assert b"/FontFile2" in data, "texts are texts"
-    assert figure.told.startswith("Tube in the plane of x1 and x2: safe set, tube, plan, obstacle")
+    assert chart.told.startswith("Tube in the plane of x1 and x2: safe set, tube, plan, obstacle")
     names = Report(certificate=told(orbit)).save_figures(tmp_path)
     assert {"tube-0-1.svg", "tube-0-1.pdf", "tube-0-1.png", "captions.md"} <= {*names}
     assert {path.name for path in tmp_path.iterdir()} == {*names}

@@ -230,7 +230,7 @@ def test_figures_mark_every_point_that_is_not_certified(done):
     assert {"sweep-rho", "sweep-bandwidth", "sweep-adaptation_rate"} <= figures.keys()
     for figure in figures.values():
         drawing = ET.fromstring(figure.svg)
-        classes = [mark.get("class") for mark in drawing.iter("rect")]
+        classes = [mark.get("class") for mark in drawing.iter("path")]
         assert (classes.count("cell refuted"), classes.count("cell error")) == (1, 1)
         assert ("cell refuted", "refuted") in figure.legend
     dots = list(ET.fromstring(figures["sweep-adaptation_rate"].svg).iter("circle"))
@@ -238,9 +238,10 @@ def test_figures_mark_every_point_that_is_not_certified(done):
     axes = [Axis.of("tube.epsilon=.2,.4"), Axis.of("tube.rho_a=1:9:log2")]
     for figure in sweep_figures(SweepTable.of("one", axes, sweep.outcomes())):
         drawing = ET.fromstring(figure.svg)
-        classes = [mark.get("class") or "" for mark in drawing.iter("rect")]
-        colored = [mark for mark in drawing.iter("rect") if mark.find("title") is not None]
-        assert len(colored) + sum(name.startswith("cell ") for name in classes) == 4
+        cells = [mark for mark in drawing.iter("path") if mark.get("class", "").startswith("cell ")]
+        colored = [mark for mark in cells if mark.find("title") is not None]
+        assert len(cells) == 4
+        assert all(mark.get("class").startswith("cell h") for mark in colored)
         assert len(colored) == (0 if figure.key == "sweep-verdict" else 2)
     assert sweep_figures(SweepTable.of("one", sweep.axes, sweep.outcomes())) == []  # its values have no order
 

@@ -46,11 +46,11 @@ def tube(result: Result, ax: Axes | None, states: tuple[str, str] | None) -> Axe
     for obstacle in result.spec.effective.obstacles:
         if set(obstacle.states) == set(chosen.names):
             axes.add_patch(_obstacle(obstacle, chosen))
-    if chosen.plan:
-        x, y = zip(*chosen.plan, strict=True)
+    if len(chosen.plan):
+        x, y = chosen.plan.T
         axes.plot(x, y, color="black", lw=1.0, ls="--", label="plan")
         axes.plot(x[0], y[0], color="black", marker="o", ms=4, ls="none", label="start of the plan")
-    view = chosen.axes([])
+    view = chosen.axes()
     axes.set_xlim(view[0].low, view[0].high)
     axes.set_ylim(view[1].low, view[1].high)
     if chosen.units[0] == chosen.units[1]:
@@ -104,7 +104,7 @@ def _plane(result: Result, names: Sequence[str]) -> Plane:
     if len(names) != 2 or len(set(names)) != 2 or not set(names) <= set(known):
         message = f"{', '.join(map(str, names))} are not two states"
         raise SpecError([Finding(code="TC112", message=message, help=f"the states are {', '.join(known)}")])
-    return figures_tube.plane(result, known, (known.index(names[0]), known.index(names[1])))
+    return figures_tube.plane(result, (known.index(names[0]), known.index(names[1])))
 
 
 def _box(axes: Axes, chosen: Plane) -> None:
@@ -120,10 +120,10 @@ def _tube(axes: Axes, result: Result, chosen: Plane) -> None:
     """Sections of the tube along the plan."""
     from matplotlib.collections import PolyCollection
 
-    if chosen.tube is None or not chosen.plan:
+    if chosen.tube is None or not len(chosen.plan):
         return
     proven = result.tube is not None and result.tube.rho_r is not None
-    sections = [chosen.tube.points() + point for point in _along(np.array(chosen.plan))]
+    sections = [chosen.tube + point for point in _along(chosen.plan)]
     color, label = (TUBE, "tube") if proven else (UNPROVEN, "tube, not proven to stay in the safe set")
     drawn = PolyCollection(sections, facecolors=color, edgecolors="none", zorder=1, label=label)
     axes.add_collection(drawn, autolim=False)

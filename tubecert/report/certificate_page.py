@@ -22,7 +22,7 @@ from tubecert.report.certificate_brief import first_blocks, reasons
 from tubecert.report.figures_gains import gain_figures
 from tubecert.report.figures_tube import input_figures, state_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
-from tubecert.report.outline import tube_outline, widths
+from tubecert.report.outline import level_set, widths
 from tubecert.report.page import (
     Block,
     Cell,
@@ -207,19 +207,12 @@ def _share(share: float | None) -> Cell:
 def _tube(result: Result) -> Iterator[Block]:
     if result.tube is not None:
         yield Facts.of(_radii(result, result.tube))
-    figures = tuple(tube_figures(result))
-    if figures:
+    if figures := tuple(tube_figures(result)):
         yield Figures(figures=figures)
-        yield from _drawn(result)
+        if widths(result) is not None:
+            yield Words(text=_CUT if level_set(result) is None else _ELLIPSE)
     if figures := tuple(state_figures(result)):
         yield Figures(figures=figures)
-
-
-def _drawn(result: Result) -> Iterator[Block]:
-    """What the outline of the tube is."""
-    outline = tube_outline(result, (0, 1))
-    if outline is not None and widths(result) is not None:
-        yield Words(text=_ELLIPSE if outline.sides is None else _CUT)
 
 
 def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, str]]:

@@ -1,7 +1,8 @@
-"""Axes and marks as SVG: a chart in viewport units that a style sheet colours, for light, dark and print.
+"""A chart as data: two axes, and marks in the values of these axes; and as SVG that a style sheet colours.
 
-Own SVG and no plotting library: the marks take their colours from the page, texts stay texts, and the same data gives
-the same bytes everywhere. `xml.etree` writes it, so it is well-formed and escaped whatever the texts hold.
+Own SVG and no plotting library: the marks take their colours from the page, for light, dark and print, texts stay
+texts, and the same data gives the same bytes everywhere. `xml.etree` writes it, so it is well-formed and escaped
+whatever the texts hold. `figures_file` paints the same marks for papers.
 """
 
 from __future__ import annotations
@@ -9,25 +10,31 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Literal, TypeAlias
+
+import numpy as np
 
 from tubecert.digits import short
+from tubecert.enclosure.interval import Array
 
-Point = tuple[float, float]
+Point: TypeAlias = tuple[float, float]
+Points: TypeAlias = Sequence[Point] | Array
 WIDTH, HEIGHT = 400, 270
-LEFT, RIGHT, TOP, BOTTOM = 60, 14, 12, 42
+LEFT, RIGHT, TOP, BOTTOM = 68, 14, 12, 42
+_AROUND = 48  # points of an ellipse
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
-    """A range of values, linear or logarithmic, with round ticks."""
+    """A range of values, linear or logarithmic, with round ticks; or rows with `names`, from 0 on."""
 
     label: str
     low: float
     high: float
     log: bool = False
+    names: tuple[str, ...] = ()
 
     @classmethod
     def around(cls, values: Iterable[float], label: str, *, log: bool = False, pad: float = 0.05) -> Axis:
@@ -36,11 +43,9 @@ class Axis:
         low, high = min(known), max(known)
         room = pad * (high - low) if high > low else 0.3 if log else 0.1 * abs(high) or 1.0
         low, high = low - room, high + room
-        return (
-            cls(label=label, low=10.0**low, high=10.0**high, log=True)
-            if log
-            else cls(label=label, low=low, high=high)
-        )
+        if log:
+            low, high = 10.0**low, 10.0**high
+        return cls(label=label, low=low, high=high, log=log)
 
     def share(self, value: float) -> float:
         """Where a value lies: 0 at the low end, 1 at the high end."""
@@ -49,8 +54,14 @@ class Axis:
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self) -> list[float]:
-        """About five round values."""
+        """About five round values, or every row."""
+        if self.names:
+            return [*map(float, range(len(self.names)))]
         return self._decades() if self.log else _steps(self.low, self.high)
+
+    def texts(self) -> list[str]:
+        """What stands beside the ticks."""
+        return list(self.names) or list(map(short, self.ticks()))
 
     def _decades(self) -> list[float]:
         first, last = math.floor(math.log10(self.low)), math.ceil(math.log10(self.high))
@@ -69,123 +80,110 @@ def _steps(low: float, high: float) -> list[float]:
     return [k * step for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A curve, a filled shape of several outlines, or dots; `style` is its class in the style sheet.
+
+    `words` say in the legend what it is, `tip` is shown by a pointer that rests on it, `size` is the radius of a dot.
+    """
+
+    kind: Literal["line", "area", "dot"]
+    parts: list[list[Point]]
+    style: str
+    words: str = ""
+    tip: str = ""
+    size: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Chart:
-    """A chart under construction; marks are clipped to the plot area, places are in the values of the axes."""
+    """A figure: marks in their order, places in the values of the axes, and a caption."""
 
     key: str
     title: str
     x: Axis
     y: Axis
     height: int = HEIGHT
-    svg: ET.Element = field(init=False)
-    plot: ET.Element = field(init=False)
+    caption: str = ""
+    marks: list[Mark] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        self.svg = blank(self.title, self.height)
-        clip = ET.SubElement(ET.SubElement(self.svg, "defs"), "clipPath", {"id": f"clip-{self.key}"})
-        ET.SubElement(clip, "rect", self._area())
-        ET.SubElement(self.svg, "rect", {"class": "ground", **self._area()})
-        self.plot = ET.SubElement(self.svg, "g", {"clip-path": f"url(#clip-{self.key})"})
-        self._axes()
-
-    def at(self, point: Point) -> Point:
-        """Viewport units of a point."""
-        across = WIDTH - LEFT - RIGHT
-        up = self.height - TOP - BOTTOM
-        return LEFT + across * self.x.share(point[0]), self.height - BOTTOM - up * self.y.share(point[1])
-
-    def line(self, points: Sequence[Point], style: str) -> None:
+    def line(self, points: Points, style: str, words: str = "") -> None:
         """A curve through points."""
-        ET.SubElement(self.plot, "path", {"class": f"curve {style}", "d": path(map(self.at, points))})
+        self.marks.append(Mark(kind="line", parts=_plain([points]), style=style, words=words))
 
-    def area(self, points: Sequence[Point], style: str) -> None:
-        """A filled polygon."""
-        ET.SubElement(self.plot, "path", {"class": style, "d": path(map(self.at, points)) + "Z"})
+    def area(self, outlines: Sequence[Points], style: str, words: str = "", tip: str = "") -> None:
+        """The union of polygons, all in the same sense of rotation."""
+        self.marks.append(Mark(kind="area", parts=_plain(outlines), style=style, words=words, tip=tip))
 
-    def box(self, low: Point, high: Point, style: str) -> ET.Element:
+    def box(self, low: Point, high: Point, style: str, words: str = "", tip: str = "") -> None:
         """A rectangle with sides along the axes."""
-        (left, bottom), (right, top) = self.at(low), self.at(high)
-        size = {"x": left, "y": top, "width": right - left, "height": bottom - top}
-        look = {"class": style} if style else {}
-        return ET.SubElement(self.plot, "rect", {**look, **{k: number(v) for k, v in size.items()}})
+        self.area([[low, (high[0], low[1]), high, (low[0], high[1])]], style, words, tip)
 
-    def ellipse(self, center: Point, radii: Point, style: str) -> None:
-        """An ellipse with half axes along the axes of the chart."""
-        (cx, cy), (right, top) = self.at(center), self.at((center[0] + radii[0], center[1] + radii[1]))
-        size = {"cx": cx, "cy": cy, "rx": right - cx, "ry": cy - top}
-        ET.SubElement(self.plot, "ellipse", {"class": style, **{k: number(v) for k, v in size.items()}})
+    def dot(self, at: Point, style: str, words: str = "", *, tip: str = "", size: float = 4.5) -> None:
+        """A round mark, which the ends of the axes do not cut."""
+        mark = Mark(kind="dot", parts=_plain([[at]]), style=style, words=words, tip=tip, size=size)
+        self.marks.append(mark)
 
-    def clipped(self, points: Sequence[Point], sides: Point) -> Chart:
-        """The same chart, whose marks are cut to the rectangles with these half sides around the points of a curve."""
-        name = f"sides-{self.key}"
-        clip = ET.SubElement(self.svg, "clipPath", {"id": name})
-        pairs = pairwise(points) if len(points) > 1 else [(points[0], points[0])]
-        parts = [path(map(self.at, _hexagon(one, other, sides))) + "Z" for one, other in pairs]
-        ET.SubElement(clip, "path", {"d": "".join(parts)})
-        inner = copy(self)
-        inner.plot = ET.SubElement(self.plot, "g", {"clip-path": f"url(#{name})"})
-        return inner
+    @property
+    def legend(self) -> tuple[tuple[str, str], ...]:
+        """What the marks are, each once, with their styles."""
+        return tuple(dict.fromkeys((mark.style, mark.words) for mark in self.marks if mark.words))
 
-    def sweep(self, points: Sequence[Point], turn: tuple[Point, Point], style: str) -> None:
-        """The union of ellipses, images of the unit disc under `turn`, around the points of a curve.
+    @property
+    def told(self) -> str:
+        """A caption that stands without the page: what is drawn, and what each mark is."""
+        shown = ", ".join(words for _, words in self.legend)
+        return f"{self.title}{': ' if shown else ''}{shown}. {self.caption}".rstrip()
 
-        A stroke with round ends is the union of discs; the group turns these into the ellipses.
-        """
-        (x0, y0), (x1, y1) = self.at((0.0, 0.0)), self.at((1.0, 1.0))
-        (a, b), (c, d) = [(value * (x1 - x0)) for value in turn[0]], [value * (y1 - y0) for value in turn[1]]
-        size = math.sqrt(abs(a * d - b * c))
-        if not 0 < size < math.inf:  # too flat or too large for any drawing
-            return
-        a, b, c, d = (value / size for value in (a, b, c, d))  # of determinant 1 or -1
-        det = a * d - b * c
-        flat = [((d * px - b * py) / det, (a * py - c * px) / det) for px, py in map(self.at, points)]
-        matrix = " ".join(f"{value:.6g}" for value in (a, c, b, d, 0, 0))
-        group = ET.SubElement(self.plot, "g", {"transform": f"matrix({matrix})"})
-        if len(flat) == 1:
-            circle = {"cx": number(flat[0][0]), "cy": number(flat[0][1]), "r": f"{size:.6g}"}
-            ET.SubElement(group, "circle", {"class": style, **circle})
-            return
-        width = {"stroke-width": f"{2 * size:.6g}"}
-        ET.SubElement(group, "path", {"class": f"sweep {style}", "d": path(flat), **width})
-
-    def dot(self, point: Point, style: str, radius: float = 4.5, words: str = "") -> None:
-        """A round mark; `words` are shown by a pointer that rests on it."""
-        cx, cy = self.at(point)
-        place = {"cx": number(cx), "cy": number(cy), "r": number(radius)}
-        mark = ET.SubElement(self.svg, "circle", {"class": f"dot {style}", **place})
-        if words:
-            ET.SubElement(mark, "title").text = words
-
-    def text(self) -> str:
-        """The SVG element."""
-        return ET.tostring(self.svg, encoding="unicode")
-
-    def _area(self) -> dict[str, str]:
-        width, height = WIDTH - LEFT - RIGHT, self.height - TOP - BOTTOM
-        return {"x": str(LEFT), "y": str(TOP), "width": str(width), "height": str(height)}
-
-    def _axes(self) -> None:
-        bottom = self.height - BOTTOM
-        grid = ET.SubElement(self.plot, "g", {"class": "grid"})
-        for value in self.x.ticks():
-            x = self.at((value, self.y.low))[0]
-            ET.SubElement(grid, "path", {"d": path([(x, TOP), (x, bottom)])})
-            text(self.svg, (x, bottom + 15), short(value), "tick middle")
-        for value in self.y.ticks():
-            y = self.at((self.x.low, value))[1]
-            ET.SubElement(grid, "path", {"d": path([(LEFT, y), (WIDTH - RIGHT, y)])})
-            text(self.svg, (LEFT - 6, y + 4), short(value), "tick end")
-        middle = (TOP + bottom) / 2
-        text(self.svg, ((LEFT + WIDTH - RIGHT) / 2, self.height - 7), self.x.label, "axis middle")
-        place = {"transform": f"translate(12 {number(middle)}) rotate(-90)"}
-        text(ET.SubElement(self.svg, "g", place), (0, 0), self.y.label, "axis middle")
+    @property
+    def svg(self) -> str:
+        """The drawing, without its title and its legend."""
+        return ET.tostring(drawing(self), encoding="unicode")
 
 
-def blank(title: str, height: int = HEIGHT) -> ET.Element:
-    """An empty drawing with a title for readers that do not see it."""
-    attributes = {"viewBox": f"0 0 {WIDTH} {height}", "role": "img", "aria-label": title}
-    return ET.Element("svg", attributes)
+def _plain(parts: Sequence[Points]) -> list[list[Point]]:
+    return [[(float(x), float(y)) for x, y in part] for part in parts]
+
+
+def drawing(chart: Chart) -> ET.Element:
+    """The marks cut to the ground between the axes, dots above all."""
+    bottom, right = chart.height - BOTTOM, WIDTH - RIGHT
+    view = {"viewBox": f"0 0 {WIDTH} {chart.height}", "role": "img", "aria-label": chart.title}
+    svg, clip = ET.Element("svg", view), f"clip-{chart.key}"
+    ground = {"x": str(LEFT), "y": str(TOP), "width": str(right - LEFT), "height": str(bottom - TOP)}
+    ET.SubElement(ET.SubElement(ET.SubElement(svg, "defs"), "clipPath", {"id": clip}), "rect", ground)
+    ET.SubElement(svg, "rect", {"class": "ground", **ground})
+    plot = ET.SubElement(svg, "g", {"clip-path": f"url(#{clip})"})
+
+    def at(point: Point) -> Point:
+        x, y = (axis.share(value) for axis, value in zip((chart.x, chart.y), point, strict=True))
+        return LEFT + (right - LEFT) * x, bottom - (bottom - TOP) * y
+
+    grid = ET.SubElement(plot, "g", {"class": "grid"})
+    for value, words in zip(chart.x.ticks(), chart.x.texts(), strict=True):
+        x, _ = at((value, chart.y.low))
+        ET.SubElement(grid, "path", {"d": path([(x, TOP), (x, bottom)])})
+        text(svg, (x, bottom + 15), words, "tick middle")
+    for value, words in zip(chart.y.ticks(), chart.y.texts(), strict=True):
+        _, y = at((chart.x.low, value))
+        ET.SubElement(grid, "path", {"d": path([(LEFT, y), (right, y)])})
+        text(svg, (LEFT - 6, y + 4), words, "tick end")
+    text(svg, ((LEFT + right) / 2, chart.height - 7), chart.x.label, "axis middle")
+    turned = {"transform": f"translate(12 {number((TOP + bottom) / 2)}) rotate(-90)"}
+    text(ET.SubElement(svg, "g", turned), (0, 0), chart.y.label, "axis middle")
+    for mark in chart.marks:
+        parts = [list(map(at, part)) for part in mark.parts]
+        if mark.kind == "dot":
+            places = {name: number(value) for name, value in zip(("cx", "cy"), parts[0][0], strict=True)}
+            look = {"class": f"dot {mark.style}", **places, "r": number(mark.size)}
+            shown = ET.SubElement(svg, "circle", look)
+        else:
+            style, end = (f"curve {mark.style}", "") if mark.kind == "line" else (mark.style, "Z")
+            look = {"class": style, "d": "".join(path(part) + end for part in parts)}
+            shown = ET.SubElement(plot, "path", look)
+        if mark.tip:
+            ET.SubElement(shown, "title").text = mark.tip
+    return svg
 
 
 def text(parent: ET.Element, place: Point, words: str, style: str) -> None:
@@ -206,12 +204,44 @@ def number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def _hexagon(one: Point, other: Point, sides: Point) -> list[Point]:
-    """The hull of two equal rectangles, always in the same sense of rotation."""
-    (x0, y0), (x1, y1), (a, b) = one, other, sides
-    if x1 < x0:
-        x0, y0, x1, y1 = x1, y1, x0, y0
-    first, last = (x0 - a, y0 - b), (x1 + a, y1 + b)
-    if y1 >= y0:
-        return [first, (x0 + a, y0 - b), (x1 + a, y1 - b), last, (x1 - a, y1 + b), (x0 - a, y0 + b)]
-    return [first, (x1 - a, y1 - b), (x1 + a, y1 - b), last, (x0 + a, y0 + b), (x0 - a, y0 + b)]
+# -- shapes, and what one covers that is carried along a curve
+
+
+def ellipse(shape: Array) -> Array:
+    """Points (N, 2) of {y: y' shape^-1 y = 1} for a shape (2, 2); never quite flat, to be seen."""
+    values, vectors = np.linalg.eigh(shape)
+    axes = vectors * np.sqrt(np.maximum(values, max(1e-12 * float(values[-1]), 1e-300)))
+    angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ axes.T
+    return np.asarray(around if np.linalg.det(axes) > 0 else around[::-1])
+
+
+def swept(curve: Array, shape: Array, fine: Array) -> list[Array]:
+    """The union of a convex `shape` (N, 2), counterclockwise about the origin, around all points of `curve` (K, 2).
+
+    Out: for every piece of the curve the hull of the shape at both ends; points that are off the line between others by
+    less than `fine` (2,) are left out.
+    """
+    known = _corners(curve / fine) if len(curve) > 1 else [0, 0]
+    return [_hull(shape, curve[one], curve[other]) for one, other in pairwise(known)]
+
+
+def _corners(curve: Array) -> list[int]:
+    """The points that a curve (K, 2) cannot do without, if one may be off by 1."""
+    kept, end = [0], 1
+    while end < len(curve) - 1:
+        inner, along = curve[kept[-1] + 1 : end + 1] - curve[kept[-1]], curve[end + 1] - curve[kept[-1]]
+        share = np.clip(inner @ along / max(float(along @ along), 1e-300), 0, 1)
+        if np.abs(inner - share[:, None] * along).max() > 1:
+            kept.append(end)
+        end += 1
+    return [*kept, len(curve) - 1]
+
+
+def _hull(shape: Array, one: Array, other: Array) -> Array:
+    """The hull of a convex shape at two places: edges that look along the way are at its end, others at its start."""
+    edge, way = np.roll(shape, -1, axis=0) - shape, other - one
+    ahead = edge[:, 1] * way[0] - edge[:, 0] * way[1] > 0
+    ends = np.stack([np.roll(ahead, 1), ahead], axis=1)  # of the edges before and after each corner
+    ring = (shape[:, None, :] + one + ends[..., None] * way).reshape(-1, 2)
+    return np.asarray(ring[np.any(ring != np.roll(ring, 1, axis=0), axis=1)])

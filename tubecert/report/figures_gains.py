@@ -5,13 +5,12 @@ In: `result` of a certificate. Out: figures. Curves and pairs are those of the c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from tubecert.certificate.result import MetricRow, Result
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.gains import NAMES, Gains, rows
-from tubecert.report.page import Figure
 
 STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b"}
 _DRAWN: Final = {
@@ -19,10 +18,11 @@ _DRAWN: Final = {
     "input_gain": "beta / sqrt(a)",
     "adaptation_rate": "least Γ (B)",
 }
+_FOUND: Final = "Points of a curve were found to serve: computed, not examined by recheck."
 _FLOORS: Final = {"identity": ("m1", "least condition number"), "input": ("m2", "least input gain")}
 
 
-def gain_figures(result: Result) -> list[Figure]:
+def gain_figures(result: Result) -> list[Chart]:
     """The trade-off of bandwidth and adaptation rate, if the certificate has data for it."""
     curves = {
         key: list(section.points())
@@ -36,18 +36,17 @@ def gain_figures(result: Result) -> list[Figure]:
     x = Axis.around([p[0] for p in every], "bandwidth ω (rad/s)", log=True)
     y = Axis.around([p[1] for p in every], "adaptation rate Γ", log=True)
     title = "Adaptation rate against bandwidth"
-    chart = Chart("trade-off", title, x, y)
-    legend = []
+    chart = Chart(key="trade-off", title=title, x=x, y=y, caption=_FOUND)
     for section, points in curves.items():
-        chart.line(points, STYLES[section])
-        legend.append((STYLES[section], NAMES[section]))
+        chart.line(points, STYLES[section], NAMES[section])
     for row, place in chosen:
-        style = STYLES[row.section]
-        chart.dot(place, f"{style} decides" if row.decides else style, 6 if row.decides else 4.5, _told(row))
-    if any(row.decides for row, _ in chosen):
-        legend.append(("decides", "decides the verdict"))
-    caption = "Points of a curve were found to serve: computed, not examined by recheck."
-    return [Figure(key="trade-off", title=title, svg=chart.text(), legend=tuple(legend), caption=caption)]
+        style, size = (" decides", 6.0) if row.decides else ("", 4.5)
+        words, tip = (
+            "decides the verdict" if row.decides else "",
+            f"{NAMES[row.section]}, {row.chosen}: {row.text()}",
+        )
+        chart.dot(place, STYLES[row.section] + style, words, tip=tip, size=size)
+    return [chart]
 
 
 def _place(row: Gains) -> Point | None:
@@ -58,28 +57,21 @@ def _place(row: Gains) -> Point | None:
     return float(pair.bandwidth), float(pair.adaptation_rate)
 
 
-def _told(row: Gains) -> str:
-    return f"{NAMES[row.section]}, {row.chosen}: {row.text()}"
-
-
-def rate_figures(rows: Sequence[MetricRow]) -> list[Figure]:
+def rate_figures(rows: Sequence[MetricRow]) -> Iterator[Chart]:
     """A figure for each quantity that any of the rows has."""
-    found = (
-        (key, label, [row for row in rows if getattr(row, key) is not None]) for key, label in _DRAWN.items()
-    )
-    return [_figure(key, label, known) for key, label, known in found if known]
-
-
-def _figure(key: str, label: str, rows: Sequence[MetricRow]) -> Figure:
-    x = Axis.around([float(row.rate) for row in rows], "rate λ (1/s)")
-    title = f"{label} against the rate"
-    chart = Chart(f"rates-{key}", title, x, Axis.around([getattr(row, key) for row in rows], label, log=True))
-    legend = []
-    for floor, (style, words) in _FLOORS.items():
-        points = sorted((float(row.rate), float(getattr(row, key))) for row in rows if row.floor == floor)
-        if points:
-            chart.line(points, style)
-            legend.append((style, words))
-        for point in points:
-            chart.dot(point, style, 3.0)
-    return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(legend))
+    for key, label in _DRAWN.items():
+        known = [
+            (row.floor, float(row.rate), float(at)) for row in rows if (at := getattr(row, key)) is not None
+        ]
+        if not known:
+            continue
+        x, y = Axis.around([at for _, at, _ in known], "rate λ (1/s)"), [value for *_, value in known]
+        title = f"{label} against the rate"
+        chart = Chart(key=f"rates-{key}", title=title, x=x, y=Axis.around(y, label, log=True))
+        for floor, (style, words) in _FLOORS.items():
+            points = sorted((at, value) for own, at, value in known if own == floor)
+            if points:
+                chart.line(points, style, words)
+            for point in points:
+                chart.dot(point, style, size=3.0)
+        yield chart

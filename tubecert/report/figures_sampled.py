@@ -5,26 +5,23 @@ In: a certificate. Out: figures in floats; nothing is decided here. A family of 
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from itertools import pairwise
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.report.figures_axes import WIDTH, Point, blank, path, text
-from tubecert.report.figures_scene import Drawing, Outline, Plane, draw_obstacles, scene
-from tubecert.report.page import Figure
+from tubecert.report.figures_axes import BOTTOM, TOP, Axis, Chart, Point
+from tubecert.report.figures_scene import Plane, labelled, over_time, scene
 from tubecert.sampled_loop.record import Certificate, Result, Shares
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import SHARES, percents
 
 _FOR_EVER: Final = 1.0  # s that are drawn of a plan without an end, beyond the start of the last stage
-_LEFT, _ROW = 90, 30  # of the bars
+_ROW: Final = 30  # units of the viewport that a bar takes
 _STYLES: Final = dict(zip(SHARES.values(), ("n1", "n4", "n2", "n3", "n5", "n6"), strict=True))
-Ends: TypeAlias = Sequence[Fraction | str]
 
 
 def period(result: Result) -> Fraction:
@@ -55,12 +52,11 @@ def band(certificate: Certificate) -> tuple[Array, Array, Array]:
     return t, x, np.repeat(rows, [len(each) for each in times], axis=0)
 
 
-def figures(certificate: Certificate) -> Iterator[Figure]:
+def figures(certificate: Certificate) -> Iterator[Chart]:
     """All of them, as far as there is something to draw."""
     result, (t, x, widths) = certificate.result, band(certificate)
     if t.size:
-        style = "tube" if result.verdict is Verdict.CERTIFIED else "unproven"
-        yield from (each.figure(style) for each in _over_time(certificate, t, x, widths))
+        yield from _over_time(certificate, t, x, widths)
         yield from _planes(result, x, widths)
     if result.tube and result.spec.effective.trajectory.kind != "equilibrium":
         yield from _deviations(result)
@@ -68,35 +64,39 @@ def figures(certificate: Certificate) -> Iterator[Figure]:
         yield _bars(result.spec.effective.system.ordered(certificate.notes.filled))
 
 
-def _over_time(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Drawing]:
+def _over_time(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Chart]:
     result, notes = certificate.result, certificate.notes
-    system, safe = result.spec.effective.system, result.spec.effective.part("safe_set")
-    told = "proven in the loop" if result.verdict is Verdict.CERTIFIED else "not proven"
-
-    def drawing(key: str, name: str, curve: Array, ends: Sequence[Array], limits: Ends | None) -> Drawing:
-        return Drawing(
-            key=key,
-            name=name,
-            unit=system.units.get(name, ""),
-            curve=_points(t, curve),
-            band=(_points(t, ends[0]), _points(t, ends[1])),
-            limits=None if limits is None else _ends(limits),
-            words=("limits" if name in system.inputs else "safe set", told, "plan"),
+    system, safe, proven, told = result.spec.effective.system, _safe_set(result), *_proven(result)
+    for i, name in enumerate(system.states):
+        sides, label = (x[:, i] - widths[:, i], x[:, i] + widths[:, i]), labelled(name, system)
+        words = "safe set", told
+        yield over_time(
+            f"state-{i}", name, label, (t, x[:, i]), band=sides, limits=safe[name], words=words, proven=proven
+        )
+    for use in result.inputs:
+        i, words, label = system.inputs.index(use.input), ("limits", told), labelled(use.input, system)
+        u = np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])
+        sides = np.full(t.shape, float(use.range[0])), np.full(t.shape, float(use.range[1]))
+        limits = None if use.limits is None else (float(use.limits[0]), float(use.limits[1]))
+        yield over_time(
+            f"input-{i}", use.input, label, (t, u), band=sides, limits=limits, words=words, proven=proven
         )
 
-    for i, name in enumerate(system.states):
-        ends = (x[:, i] - widths[:, i], x[:, i] + widths[:, i])
-        yield drawing(f"state-{i}", name, x[:, i], ends, safe[name])
-    for use in result.inputs:
-        i = system.inputs.index(use.input)
-        curve = np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])
-        ends = (np.full(t.shape, float(use.range[0])), np.full(t.shape, float(use.range[1])))
-        yield drawing(f"input-{i}", use.input, curve, ends, use.limits)
+
+def _proven(result: Result) -> tuple[bool, str]:
+    """Whether the tube is proven, and what its band is called."""
+    proven = result.verdict is Verdict.CERTIFIED
+    return proven, "proven in the loop" if proven else "not proven"
 
 
-def _deviations(result: Result) -> Iterator[Figure]:
+def _safe_set(result: Result) -> Mapping[str, Point]:
+    told = result.spec.effective.part("safe_set")
+    return {name: (float(Fraction(low)), float(Fraction(high))) for name, (low, high) in told.items()}
+
+
+def _deviations(result: Result) -> Iterator[Chart]:
     """What each state may be off its plan over time: of a plan that moves, too little to be seen beside it."""
-    proven, effective = result.verdict is Verdict.CERTIFIED, result.spec.effective
+    effective, (proven, told) = result.spec.effective, _proven(result)
     starts = [float(stage.start * period(result)) for stage in result.tube]
     last = result.claim.horizon
     ends = pairwise([*starts, starts[-1] + _FOR_EVER if last is None else float(last)])
@@ -104,65 +104,35 @@ def _deviations(result: Result) -> Iterator[Figure]:
     for i, name in enumerate(effective.system.states):
         widths = np.repeat([float(stage.half_widths[name]) for stage in result.tube], 2)
         wish = effective.tube.half_widths.get(name)
-        yield Drawing(
-            key=f"deviation-{i}",
-            name=f"{name} - {name}*",
-            unit=effective.system.units.get(name, ""),
-            curve=_points(t, 0 * t),
-            band=(_points(t, -widths), _points(t, widths)),
-            limits=None if wish is None else (-float(wish), float(wish)),
-            words=("wish", "proven in the loop" if proven else "not proven", "plan"),
-        ).figure("tube" if proven else "unproven")
-
-
-def _planes(result: Result, x: Array, widths: Array) -> Iterator[Figure]:
-    """The planes in which there are obstacles, with the widest tube."""
-    effective = result.spec.effective
-    states, units, proven = (
-        effective.system.states,
-        effective.system.units,
-        result.verdict is Verdict.CERTIFIED,
-    )
-    for names in dict.fromkeys(obstacle.states for obstacle in effective.obstacles):
-        i, j = map(states.index, names)
-        a, b = map(float, widths[:, [i, j]].max(axis=0))
-        (left, right), (low, high) = (_ends(effective.part("safe_set")[name]) for name in names)
-        plane = Plane(
-            names=names,
-            units=(units.get(names[0], ""), units.get(names[1], "")),
-            index=(i, j),
-            plan=tuple(_points(x[:, i], x[:, j])),
-            tube=Outline(turn=((2 * a, 0.0), (0.0, 2 * b)), sides=(a, b)),
-            safe=((left, low), (right, high)),
+        limits, off = None if wish is None else (-float(wish), float(wish)), f"{name} - {name}*"
+        label, words = labelled(name, effective.system).replace(name, off, 1), ("wish", told)
+        sides = -widths, widths
+        yield over_time(
+            f"deviation-{i}", off, label, (t, 0 * t), band=sides, limits=limits, words=words, proven=proven
         )
-        chart, legend = scene(f"plane-{i}-{j}", plane, [], proven)
-        legend += draw_obstacles(chart, effective.obstacles, names)
-        title = f"Tube in the plane of {' and '.join(names)}"
-        yield Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(legend))
 
 
-def _bars(filled: Mapping[str, Shares]) -> Figure:
+def _planes(result: Result, x: Array, widths: Array) -> Iterator[Chart]:
+    """The planes in which there are obstacles, with the widest tube."""
+    effective, safe = result.spec.effective, _safe_set(result)
+    for names in dict.fromkeys(obstacle.states for obstacle in effective.obstacles):
+        i, j = map(effective.system.states.index, names)
+        tube = widths[:, [i, j]].max(axis=0) * [(1, 1), (-1, 1), (-1, -1), (1, -1)]
+        plane = Plane.of(effective.system, (i, j), x, tube, [safe[name] for name in names])
+        yield scene(f"plane-{i}-{j}", plane, effective.obstacles, proven=_proven(result)[0])
+
+
+def _bars(filled: Mapping[str, Shares]) -> Chart:
     """A bar for each state in the long run and each input, of what fills it, as shares of the whole."""
-    title, used = "What fills the tube and the inputs", dict[str, None]()
-    svg = blank(title, _ROW * len(filled) + 10)
-    for row, (name, shares) in enumerate(filled.items()):
-        y, x = _ROW * row + 20, float(_LEFT)
-        text(svg, (_LEFT - 8, y + 4), name, "axis end")
-        for what, part in percents(shares).items():
-            end = x + part / 100 * (WIDTH - _LEFT - 10)
-            look = {"class": f"curve bar {_STYLES[what]}", "d": path([(x, y), (end, y)])}
-            bar = ET.SubElement(svg, "path", look)
-            ET.SubElement(bar, "title").text = f"{what} {part} %"
-            used[what], x = None, end
-    legend = tuple((_STYLES[what], what) for what in SHARES.values() if what in used)
+    names, title = tuple(filled)[::-1], "What fills the tube and the inputs"  # the first one above
+    rows = Axis(label="", low=-0.5, high=len(names) - 0.5, names=names)
+    share, height = Axis(label="share (%)", low=0, high=100), _ROW * len(names) + TOP + BOTTOM
     caption = "Each bar is the whole of a half-width in the long run, or of what is added to an input."
-    drawn = ET.tostring(svg, encoding="unicode")
-    return Figure(key="shares", title=title, svg=drawn, legend=legend, caption=caption)
-
-
-def _points(x: Array, y: Array) -> list[Point]:
-    return list(zip(x.tolist(), y.tolist(), strict=True))
-
-
-def _ends(ends: Ends) -> Point:
-    return float(Fraction(ends[0])), float(Fraction(ends[1]))
+    chart = Chart(key="shares", title=title, x=share, y=rows, height=height, caption=caption)
+    for row, name in enumerate(names):
+        at = 0
+        for what, part in percents(filled[name]).items():
+            low, high = (at, row - 0.3), (at + part, row + 0.3)
+            chart.box(low, high, f"bar {_STYLES[what]}", what, f"{what} {part} %")
+            at += part
+    return chart

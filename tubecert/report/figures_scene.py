@@ -2,145 +2,136 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tubecert.certificate.effective import ObstacleView
+from tubecert.certificate.effective import ObstacleView, SystemView
 from tubecert.enclosure.interval import Array
-from tubecert.report.figures_axes import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Chart, Point
-from tubecert.report.page import Figure
+from tubecert.report.figures_axes import (
+    BOTTOM,
+    HEIGHT,
+    LEFT,
+    RIGHT,
+    TOP,
+    WIDTH,
+    Axis,
+    Chart,
+    Point,
+    ellipse,
+    swept,
+)
 
-Pair = tuple[float, float]
-Matrix = tuple[Pair, Pair]
 _ZOOM = 4.0  # a safe set larger than this many tubes is shown in part
 _HEIGHT = 190
+_FINE = 0.2  # units of the viewport
+TUBE = {True: "tube", False: "unproven"}  # the style, by whether it is proven
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drawing:
-    """A curve of the plan, the band around it that is proven (below, above), and the limits of the quantity."""
+def over_time(
+    key: str,
+    name: str,
+    label: str,
+    curve: tuple[Array, Array],
+    *,
+    band: tuple[Array, Array] | None,
+    limits: Point | None,
+    words: tuple[str, str],
+    proven: bool,
+) -> Chart:
+    """A curve of the plan (t in s, values), the band around it (below, above), and the limits, as far as known.
 
-    key: str
-    name: str
-    unit: str
-    curve: Sequence[Point]
-    band: tuple[list[Point], list[Point]] | None
-    limits: Point | None
-    words: tuple[str, str, str]  # of the limits, the band, the curve
-
-    def figure(self, style: str) -> Figure:
-        """The figure; `style` is that of the band."""
-        label = f"{self.name} ({self.unit})" if self.unit else self.name
-        below, above = self.band or ([], [])
-        shown = [value for _, value in [*self.curve, *below, *above]]
-        safe = self.limits or (shown[0], shown[0])
-        y = view(shown, safe, label, near=is_near(shown, safe))
-        time = Axis(label="t (s)", low=self.curve[0][0], high=self.curve[-1][0])
-        chart = Chart(self.key, f"{self.name} over time", time, y, height=_HEIGHT)
-        if self.limits is not None:
-            chart.box((time.low, y.low), (time.high, y.high), "outside")
-            chart.box((time.low, self.limits[0]), (time.high, self.limits[1]), "safe")
-        if self.band is not None:
-            chart.area([*above, *reversed(below)], style)
-        chart.line(self.curve, "plan")
-        return Figure(
-            key=self.key, title=f"{self.name} over time", svg=chart.text(), legend=self._legend(style)
-        )
-
-    def _legend(self, style: str) -> tuple[tuple[str, str], ...]:
-        drawn = (("safe", self.limits), (style, self.band), ("plan", self.curve))
-        return tuple(
-            (key, words) for (key, part), words in zip(drawn, self.words, strict=True) if part is not None
-        )
+    `words` say what the limits and the band are.
+    """
+    t, x = curve
+    shown = np.concatenate([x, *(band or ())])
+    safe = limits or (x[0], x[0])
+    y = view(shown, safe, label, near=is_near(shown, safe))
+    time = Axis(label="t (s)", low=float(t[0]), high=float(t[-1]))
+    chart = Chart(key=key, title=f"{name} over time", x=time, y=y, height=_HEIGHT)
+    if limits is not None:
+        chart.box((time.low, y.low), (time.high, y.high), "outside")
+        chart.box((time.low, limits[0]), (time.high, limits[1]), "safe", words[0])
+    if band is not None:
+        around = [np.stack([t, side], axis=1) for side in band]
+        chart.area([np.concatenate([around[1], around[0][::-1]])], TUBE[proven], words[1])
+    chart.line(np.stack(curve, axis=1), "plan", "plan")
+    return chart
 
 
-def is_near(shown: Sequence[float], safe: Point) -> bool:
+def is_near(shown: Array, safe: Point) -> bool:
     """Whether values can be told apart beside the whole safe range."""
-    return not shown or safe[1] - safe[0] <= _ZOOM * (max(shown) - min(shown))
+    return not len(shown) or safe[1] - safe[0] <= _ZOOM * (shown.max() - shown.min())
 
 
-def view(shown: Sequence[float], safe: Point, label: str, *, near: bool) -> Axis:
+def view(shown: Array, safe: Point, label: str, *, near: bool) -> Axis:
     """An axis that shows some values, with or without the safe range."""
     return Axis.around([*shown, *safe] if near else shown, label, pad=0.06 if near else 0.25)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outline:
-    """The image of the unit disc under `turn`, cut to `sides` on both sides of each coordinate, if any."""
-
-    turn: Matrix
-    sides: Pair | None = None
-
-    @property
-    def reach(self) -> Pair:
-        """How far it goes in each coordinate."""
-        first, second = (math.hypot(*row) for row in self.turn)
-        return (
-            (first, second) if self.sides is None else (min(first, self.sides[0]), min(second, self.sides[1]))
-        )
-
-    def points(self, number: int = 72) -> Array:
-        """Points (number, 2) around it."""
-        angle = np.linspace(0.0, 2 * np.pi, number + 1)[:-1]
-        around = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.array(self.turn).T
-        sides = np.array((np.inf, np.inf) if self.sides is None else self.sides)
-        return np.asarray(np.clip(around, -sides, sides))
+def labelled(name: str, system: SystemView) -> str:
+    """A state or an input with its unit, if it has one."""
+    unit = system.units.get(name, "")
+    return f"{name} ({unit})" if unit else name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plane:
-    """What is known in the plane of two states: the plan, the tube and its domain at one time, the safe set."""
+    """What is known in the plane of two states: the plan (K, 2), the outline (N, 2) of the tube, the safe set."""
 
     names: tuple[str, str]
     units: tuple[str, str]
-    index: tuple[int, int]
-    plan: tuple[Point, ...]
-    tube: Outline | None
+    labels: tuple[str, str]
+    plan: Array
+    tube: Array | None
     safe: tuple[Point, Point]
 
-    def of(self, x: Sequence[float]) -> Point:
-        """The two coordinates of a state."""
-        return float(x[self.index[0]]), float(x[self.index[1]])
+    @classmethod
+    def of(
+        cls, system: SystemView, pair: tuple[int, int], x: Array, tube: Array | None, safe: Sequence[Point]
+    ) -> Plane:
+        """The plane of two states by their places; `x` (K, n) is the plan, `safe` the range of each of the two."""
+        names = system.states[pair[0]], system.states[pair[1]]
+        return cls(
+            names=names,
+            units=(system.units.get(names[0], ""), system.units.get(names[1], "")),
+            labels=(labelled(names[0], system), labelled(names[1], system)),
+            plan=x[:, pair],
+            tube=tube,
+            safe=((safe[0][0], safe[1][0]), (safe[0][1], safe[1][1])),
+        )
 
-    def axes(self, marks: Sequence[Point]) -> tuple[Axis, Axis]:
+    def axes(self, marks: Sequence[Point] = ()) -> tuple[Axis, Axis]:
         """Axes that show the tube, the marks, and of the safe set as much as leaves the tube visible."""
-        shown = [self._shown(i, [mark[i] for mark in marks]) for i in (0, 1)]
+        reach = np.zeros(2) if self.tube is None else np.abs(self.tube).max(axis=0)
+        shown = np.concatenate([self.plan - reach, self.plan + reach, np.reshape(marks, (-1, 2))])
         safe = [(self.safe[0][i], self.safe[1][i]) for i in (0, 1)]
-        near = all(map(is_near, shown, safe))
-        first, second = (view(shown[i], safe[i], self._label(i), near=near) for i in (0, 1))
+        near = all(is_near(shown[:, i], safe[i]) for i in (0, 1))
+        first, second = (view(shown[:, i], safe[i], self.labels[i], near=near) for i in (0, 1))
         return first, second
-
-    def _shown(self, i: int, marks: list[float]) -> list[float]:
-        reach = 0.0 if self.tube is None else self.tube.reach[i]
-        return [p[i] + side for p in self.plan for side in (-reach, reach)] + marks
-
-    def _label(self, i: int) -> str:
-        return f"{self.names[i]} ({self.units[i]})" if self.units[i] else self.names[i]
 
 
 def scene(
-    key: str, plane: Plane, marks: list[Point], proven: bool = True
-) -> tuple[Chart, list[tuple[str, str]]]:
-    """A chart with the safe set, the tube and the plan; and their legend."""
+    key: str, plane: Plane, obstacles: Sequence[ObstacleView], marks: Sequence[Point] = (), *, proven: bool
+) -> Chart:
+    """A chart with the safe set, the tube, the plan, and the obstacles in the plane."""
     x, y = plane.axes(marks)
-    title = f"Plan and tube in the plane of {plane.names[0]} and {plane.names[1]}"
-    chart = Chart(key, title, x, y, height=_height_of(plane, x, y))
+    title, height = f"Tube in the plane of {plane.names[0]} and {plane.names[1]}", _height_of(plane, x, y)
+    chart = Chart(key=key, title=title, x=x, y=y, height=height)
     chart.box((x.low, y.low), (x.high, y.high), "outside")
-    chart.box(*plane.safe, "safe")
-    legend = [("safe", "safe set")]
-    if plane.plan and plane.tube is not None:
-        inner = chart if plane.tube.sides is None else chart.clipped(plane.plan, plane.tube.sides)
-        inner.sweep(plane.plan, plane.tube.turn, "tube" if proven else "unproven")
-        legend.append(
-            ("tube", "tube") if proven else ("unproven", "tube, not proven to stay in the safe set")
-        )
+    chart.box(*plane.safe, "safe", "safe set")
+    if len(plane.plan) and plane.tube is not None and np.isfinite(plane.tube).all():
+        across, up = WIDTH - LEFT - RIGHT, height - TOP - BOTTOM
+        fine = _FINE * np.array([(x.high - x.low) / across, (y.high - y.low) / up])
+        words = "tube" if proven else "tube, not proven to stay in the safe set"
+        chart.area(swept(plane.plan, plane.tube, fine), TUBE[proven], words)
     if len(plane.plan) > 1:
-        chart.line(plane.plan, "plan")
-        legend.append(("plan", "plan"))
-    return chart, legend
+        chart.line(plane.plan, "plan", "plan")
+    shapes = [_shape(each, plane.names) for each in obstacles if set(each.states) == set(plane.names)]
+    for shape in shapes:
+        chart.area([shape], "obstacle", "obstacle")
+    return chart
 
 
 def _height_of(plane: Plane, x: Axis, y: Axis) -> int:
@@ -151,16 +142,10 @@ def _height_of(plane: Plane, x: Axis, y: Axis) -> int:
     return min(max(height, 200), 420)
 
 
-def draw_obstacles(
-    chart: Chart, obstacles: Sequence[ObstacleView], names: tuple[str, str]
-) -> list[tuple[str, str]]:
-    """Those in the plane of two states; what their colour means, if there are any."""
-    found = [obstacle for obstacle in obstacles if set(obstacle.states) == set(names)]
-    for obstacle in found:
-        a, b = (0, 1) if obstacle.states == names else (1, 0)
-        if obstacle.disc is not None:
-            center, radius = obstacle.disc.center, float(obstacle.disc.radius)
-            chart.ellipse((float(center[a]), float(center[b])), (radius, radius), "obstacle")
-        else:
-            chart.area([(float(corner[a]), float(corner[b])) for corner in obstacle.polygon], "obstacle")
-    return [("obstacle", "obstacle")] if found else []
+def _shape(obstacle: ObstacleView, names: tuple[str, str]) -> Array:
+    """The corners of an obstacle, or points around it, (K, 2) in the order of the states of the plane."""
+    own = np.array(obstacle.polygon, dtype=float).reshape(-1, 2)
+    if obstacle.disc is not None:
+        center, radius = np.array(obstacle.disc.center, dtype=float), float(obstacle.disc.radius)
+        own = center + ellipse(radius**2 * np.eye(2))
+    return own if obstacle.states == names else own[:, ::-1]

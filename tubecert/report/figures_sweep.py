@@ -5,25 +5,25 @@ In: the table of a sweep. Out: figures. A value is drawn where its own kind is c
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise, product
-from math import log, sqrt
+from math import sqrt
 from typing import Final
 
+import numpy as np
+
 from tubecert.digits import short
-from tubecert.report.figures_axes import LEFT, RIGHT, WIDTH, Axis, Chart, Point, number, text
+from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.figures_gains import STYLES
-from tubecert.report.page import Block, Figure, Figures, Page, Section, Words
+from tubecert.report.page import Block, Figures, Page, Section, Words
 from tubecert.report.quantities import Quantity
 from tubecert.report.sweep import ERROR, Row, SweepTable
 from tubecert.sweep import grid
 from tubecert.verdict import Verdict
 
-_COLORS: Final = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))  # viridis
 _PARTS: Final = ("epsilon", "rho_a", "rho_r")  # of rho, which is drawn
-_STRIP, _STEPS = 40, 40  # height of the scale of colours below a heat map, and its colours
+_HEAT: Final = 7  # colours of a heat map, in the style sheet
 _WIDE: Final = 20  # times the least: such values are drawn by their logarithms
 _LEGEND: Final = {
     **{str(verdict): str(verdict) for verdict in Verdict},
@@ -32,7 +32,7 @@ _LEGEND: Final = {
 }
 
 
-def sweep_figures(table: SweepTable) -> list[Figure]:
+def sweep_figures(table: SweepTable) -> list[Chart]:
     """Every figure that there is: over one or two keys whose values are numbers in order."""
     if not all(_ordered(axis.numbers or ()) for axis in table.axes):
         return []
@@ -41,7 +41,7 @@ def sweep_figures(table: SweepTable) -> list[Figure]:
     return list(_maps(table)) if len(table.axes) == 2 else []
 
 
-def with_figures(page: Page, drawn: Sequence[Figure]) -> Page:
+def with_figures(page: Page, drawn: Sequence[Chart]) -> Page:
     """The page of a sweep with its figures, or with why there are none."""
     shown: Block = Figures(figures=tuple(drawn))
     if not drawn:
@@ -81,7 +81,7 @@ def _value(row: Row, quantity: Quantity) -> float | None:
 # -- one key
 
 
-def _curves(table: SweepTable, axis: grid.Axis) -> Iterator[Figure]:
+def _curves(table: SweepTable, axis: grid.Axis) -> Iterator[Chart]:
     """A chart for each quantity, the same gain of all kinds and all half-widths in one; rho comes first."""
     groups: dict[str, list[Quantity]] = {}
     for each in sorted(_shown(table), key=lambda each: each.name != "rho"):
@@ -91,36 +91,37 @@ def _curves(table: SweepTable, axis: grid.Axis) -> Iterator[Figure]:
         yield _curve(table, axis, name, members)
 
 
-def _curve(table: SweepTable, axis: grid.Axis, name: str, members: Sequence[Quantity]) -> Figure:
+def _curve(table: SweepTable, axis: grid.Axis, name: str, members: Sequence[Quantity]) -> Chart:
     places = axis.numbers or ()
     label = members[0].words.rpartition(", ")[2] if members[0].section else name.replace("_", " ")
     values = [v for each in members for row in table.rows if (v := _value(row, each)) is not None]
     x = Axis.around(places, axis.path, log=axis.log, pad=0.03)
-    title = f"{label} against {axis.path}"
-    chart = Chart(f"sweep-{name}", title, x, Axis.around(values, label, log=_is_wide(values)))
-    legend = [
-        (f"cell {key}", words) for key, words in _LEGEND.items() if key != "certified" and table.count(key)
-    ]
+    chart = Chart(
+        key=f"sweep-{name}",
+        title=f"{label} against {axis.path}",
+        x=x,
+        y=Axis.around(values, label, log=_is_wide(values)),
+        caption="Every dot is a certificate; shaded: the verdict is not certified.",
+    )
     for (one, other), row in zip(pairwise(_edges(axis)), table.rows, strict=True):
         if row.verdict != Verdict.CERTIFIED:
             low, high = max(min(one, other), x.low), min(max(one, other), x.high)
-            chart.box((low, chart.y.low), (high, chart.y.high), f"cell {row.verdict}")
+            chart.box((low, chart.y.low), (high, chart.y.high), f"cell {row.verdict}", _LEGEND[row.verdict])
     for index, each in enumerate(members):
         style = STYLES.get(each.section, "") if each.section else f"m{index % 3 + 1}"
-        _line(chart, [(at, _value(row, each)) for at, row in zip(places, table.rows, strict=True)], style)
-        legend.append((style, each.words.removesuffix(f", {label}") if each.section else each.words))
-    caption = "Every dot is a certificate; shaded: the verdict is not certified."
-    return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(legend), caption=caption)
+        points = [(at, _value(row, each)) for at, row in zip(places, table.rows, strict=True)]
+        _line(chart, points, style, each.words.removesuffix(f", {label}") if each.section else each.words)
+    return chart
 
 
-def _line(chart: Chart, points: Sequence[tuple[float, float | None]], style: str) -> None:
+def _line(chart: Chart, points: Sequence[tuple[float, float | None]], style: str, words: str) -> None:
     """A curve, interrupted where there is no value."""
     for known, part in groupby(points, key=lambda point: point[1] is not None):
         drawn = [(x, y) for x, y in part if y is not None]
-        if known and len(drawn) > 1:
-            chart.line(drawn, style)
+        if known:
+            chart.line(drawn, style, words)
         for point in drawn:
-            chart.dot(point, style, 3.0, f"{short(point[0])}: {short(point[1])}")
+            chart.dot(point, style, tip=f"{short(point[0])}: {short(point[1])}", size=3.0)
 
 
 # -- two keys
@@ -133,63 +134,45 @@ def _cells(table: SweepTable) -> Iterator[tuple[Row, Point, Point]]:
         yield row, (min(columns), min(rows)), (max(columns), max(rows))
 
 
-def _plane(table: SweepTable, key: str, title: str) -> Chart:
-    """The axes of a heat map, without room beside the cells."""
+def _plane(table: SweepTable, key: str, title: str, caption: str) -> Chart:
+    """A heat map without cells, and without room beside them."""
     y, x = (Axis.around(_edges(axis), axis.path, log=axis.log, pad=0.0) for axis in table.axes)
-    return Chart(key, title, x, y)
+    return Chart(key=key, title=title, x=x, y=y, caption=caption)
 
 
-def _maps(table: SweepTable) -> Iterator[Figure]:
-    chart = _plane(table, "sweep-verdict", "Verdict")
-    for row, low, high in _cells(table):
-        chart.box(low, high, f"cell {row.verdict}")
-    legend = tuple((f"cell {key}", words) for key, words in _LEGEND.items() if table.count(key))
+def _maps(table: SweepTable) -> Iterator[Chart]:
     caption = "Each cell is one certification, at the values in its middle."
-    yield Figure(key=chart.key, title="Verdict", svg=chart.text(), legend=legend, caption=caption)
+    chart = _plane(table, "sweep-verdict", "Verdict", caption)
+    for row, low, high in _cells(table):
+        chart.box(low, high, f"cell {row.verdict}", _LEGEND[row.verdict])
+    yield chart
     for each in _shown(table):
         yield _map(table, each)
 
 
-def _map(table: SweepTable, quantity: Quantity) -> Figure:
+def _map(table: SweepTable, quantity: Quantity) -> Chart:
+    """A colour for each of so many equal steps, in factors where values are wide apart; the least first."""
     values = [v for row in table.rows if (v := _value(row, quantity)) is not None]
-    low, high, wide = min(values), max(values), _is_wide(values)
-    chart = _plane(table, f"sweep-{quantity.key.replace('.', '-')}", quantity.words)
-    missing: dict[str, None] = {}
-    for row, lower, upper in _cells(table):
-        value = _value(row, quantity)
-        if value is None:
+    space = np.geomspace if _is_wide(values) else np.linspace
+    steps = space(min(values), max(values), _HEAT + 1)
+    key = f"sweep-{quantity.key.replace('.', '-')}"
+    chart = _plane(
+        table,
+        key,
+        quantity.words,
+        "A colour stands for a range of values; a pointer that rests on a cell shows its own.",
+    )
+    cells = [(value, cell) for cell in _cells(table) if (value := _value(cell[0], quantity)) is not None]
+    for value, (_, low, high) in sorted(cells, key=lambda each: each[0]):
+        step = min(int(np.searchsorted(steps, value, side="right")) - 1, _HEAT - 1)
+        words = f"{short(steps[step], 3)} to {short(steps[step + 1], 3)}"
+        chart.box(low, high, f"cell h{step}", words, short(value))
+    for row, low, high in _cells(table):
+        if _value(row, quantity) is None:
             verdict = str(row.value(f"{quantity.section}.verdict") or row.verdict)
             style = verdict if verdict != Verdict.CERTIFIED else "none"
-            missing[style] = None
-            chart.box(lower, upper, f"cell {style}")
-            continue
-        share = log(value / low) / log(high / low) if wide else (value - low) / (high - low)
-        rect = chart.box(lower, upper, "")
-        rect.set("fill", _color(share))
-        ET.SubElement(rect, "title").text = short(value)
-    _scale(chart, short(low), short(high), "in equal factors" if wide else "")
-    legend = tuple((f"cell {style}", _LEGEND[style]) for style in missing)
-    return Figure(key=chart.key, title=quantity.words, svg=chart.text(), legend=legend)
-
-
-def _scale(chart: Chart, low: str, high: str, how: str) -> None:
-    """Explains the colours below the drawing."""
-    chart.svg.set("viewBox", f"0 0 {WIDTH} {chart.height + _STRIP}")
-    top, width = chart.height + 4, WIDTH - LEFT - RIGHT
-    for step in range(_STEPS):
-        place = {"x": number(LEFT + width * step / _STEPS), "y": str(top), "height": "12"}
-        look = {"width": number(width / _STEPS + 0.5), "fill": _color(step / (_STEPS - 1))}
-        ET.SubElement(chart.svg, "rect", {**place, **look})
-    for words, at, style in ((low, 0.0, "tick"), (how, 0.5, "tick middle"), (high, 1.0, "tick end")):
-        text(chart.svg, (LEFT + at * width, top + 26), words, style)
-
-
-def _color(place: float) -> str:
-    """A colour of the scale, from 0 to 1."""
-    index = min(int(place * (len(_COLORS) - 1)), len(_COLORS) - 2)
-    part = place * (len(_COLORS) - 1) - index
-    mixed = (round(a + (b - a) * part) for a, b in zip(_COLORS[index], _COLORS[index + 1], strict=True))
-    return "#" + "".join(f"{channel:02x}" for channel in mixed)
+            chart.box(low, high, f"cell {style}", _LEGEND[style])
+    return chart
 
 
 def _is_wide(values: Sequence[float]) -> bool:

@@ -5,127 +5,96 @@ In: `result` of a certificate. Out: a figure per pair of states, per state and p
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from fractions import Fraction
-from typing import TypeAlias
+
+import numpy as np
 
 from tubecert.certificate.result import InputData, Result
+from tubecert.enclosure.interval import Array
 from tubecert.report import planned
 from tubecert.report.claimed import point
-from tubecert.report.figures_axes import Point
-from tubecert.report.figures_scene import Drawing, Plane, draw_obstacles, scene
+from tubecert.report.figures_axes import Chart, Point
+from tubecert.report.figures_scene import Plane, labelled, over_time, scene
 from tubecert.report.outline import tube_outline, widths
-from tubecert.report.page import Figure
-
-Band: TypeAlias = tuple[list[Point], list[Point]] | None
 
 
-def planes(result: Result) -> list[Plane]:
+def tube_figures(result: Result) -> Iterator[Chart]:
+    """The tube in each plane, with the obstacles that lie in it and the witnesses of what was refuted."""
+    for pair in _pairs(result):
+        yield plane_figure(result, pair)
+
+
+def _pairs(result: Result) -> list[tuple[int, int]]:
     """The planes to draw: all pairs of up to three states, else neighbours two by two and those of obstacles."""
-    states = list(result.spec.effective.system.states)
+    states = result.spec.effective.system.states
     n = len(states)
     if n <= 3:
         pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
     else:
         pairs = [(i, i + 1) if i + 1 < n else (i - 1, i) for i in range(0, n, 2)]
     for obstacle in result.spec.effective.obstacles:
-        own = [i for i, name in enumerate(states) if name in obstacle.states]
-        if len(own) == 2 and (own[0], own[1]) not in pairs:
-            pairs.append((own[0], own[1]))
-    return [plane(result, states, pair) for pair in pairs]
+        i, j = sorted(map(states.index, obstacle.states))
+        if (i, j) not in pairs:
+            pairs.append((i, j))
+    return pairs
 
 
-def plane(result: Result, states: list[str], pair: tuple[int, int]) -> Plane:
+def plane(result: Result, pair: tuple[int, int]) -> Plane:
     """What is known in the plane of two states, by their places."""
-    i, j = pair
-    units = result.spec.effective.system.units
-    samples = () if result.plan.samples is None else result.plan.samples.x
-    low, high = zip(*(map(float, result.safe_set[states[k]]) for k in pair), strict=True)
-    return Plane(
-        names=(states[i], states[j]),
-        units=(units.get(states[i], ""), units.get(states[j], "")),
-        index=pair,
-        plan=tuple((float(x[i]), float(x[j])) for x in samples),
-        tube=tube_outline(result, pair),
-        safe=((low[0], low[1]), (high[0], high[1])),
-    )
+    system, samples = result.spec.effective.system, result.plan.samples
+    x = np.array(() if samples is None else samples.x, dtype=float).reshape(-1, len(system.states))
+    safe = [_range(result.safe_set[system.states[i]]) for i in pair]
+    return Plane.of(system, pair, x, tube_outline(result, pair), safe)
 
 
-def tube_figures(result: Result) -> list[Figure]:
-    """The tube in each plane, with the obstacles that lie in it and the witnesses of what was refuted."""
-    return [_tube(result, plane) for plane in planes(result)]
-
-
-def _tube(result: Result, plane: Plane) -> Figure:
-    title = f"Tube in the plane of {plane.names[0]} and {plane.names[1]}"
+def plane_figure(result: Result, pair: tuple[int, int]) -> Chart:
+    """The tube in the plane of two states, by their places."""
+    own, proven = plane(result, pair), result.tube is not None and result.tube.rho_r is not None
     witnesses = [
-        (plane.of(at.x), f"{reason.claim.title}: {point(result, at)}")
+        ((float(at.x[pair[0]]), float(at.x[pair[1]])), f"{reason.claim.title}: {point(result, at)}")
         for reason in result.reasons
-        if (at := reason.at) is not None and len(at.x) > max(plane.index)
+        if (at := reason.at) is not None and len(at.x) > max(pair)
     ]
-    proven = result.tube is not None and result.tube.rho_r is not None
-    chart, legend = scene(f"tube-{plane.index[0]}-{plane.index[1]}", plane, [p for p, _ in witnesses], proven)
-    legend += draw_obstacles(chart, result.spec.effective.obstacles, plane.names)
-    if plane.plan:
-        chart.dot(plane.plan[0], "start", words="start of the plan")
-        legend.append(("start", "start of the plan" if len(plane.plan) > 1 else "the plan, an equilibrium"))
+    places = [place for place, _ in witnesses]
+    chart = scene(f"tube-{pair[0]}-{pair[1]}", own, result.spec.effective.obstacles, places, proven=proven)
+    if len(own.plan):
+        words = "start of the plan" if len(own.plan) > 1 else "the plan, an equilibrium"
+        chart.dot(own.plan[0], "start", words, tip="start of the plan")
     for place, words in witnesses:
-        chart.dot(place, "witness", 6, words)
-    if witnesses:
-        legend.append(("witness", "witness"))
-    return Figure(key=chart.key, title=title, svg=chart.text(), legend=tuple(dict.fromkeys(legend)))
+        chart.dot(place, "witness", "witness", tip=words, size=6)
+    return chart
 
 
-def state_figures(result: Result) -> list[Figure]:
+def state_figures(result: Result) -> Iterator[Chart]:
     """Every state of the plan with its half-width."""
-    known, inside = widths(result), result.tube is not None and result.tube.rho_r is not None
-    words = ("safe set", "proven band" if inside else "tube, not proven to stay in the safe set", "plan")
-    system = result.spec.effective.system
-    drawings = (
-        Drawing(
-            key=f"state-{i}",
-            name=name,
-            unit=system.units.get(name, ""),
-            curve=curve,
-            band=None if known is None else _around(curve, known[name], known[name]),
-            limits=_range(result.safe_set[name]),
-            words=words,
-        )
-        for i, (name, curve) in enumerate(zip(system.states, planned.states(result), strict=False))
-    )
-    return [drawing.figure("tube" if inside else "unproven") for drawing in drawings]
+    known, proven = widths(result), result.tube is not None and result.tube.rho_r is not None
+    words = "safe set", "proven band" if proven else "tube, not proven to stay in the safe set"
+    system, (t, curves) = result.spec.effective.system, planned.states(result)
+    for i, (name, x) in enumerate(zip(system.states, curves, strict=False)):
+        band = None if known is None else (x - known[name], x + known[name])
+        safe, label = _range(result.safe_set[name]), labelled(name, system)
+        yield over_time(f"state-{i}", name, label, (t, x), band=band, limits=safe, words=words, proven=proven)
 
 
-def input_figures(result: Result) -> list[Figure]:
+def input_figures(result: Result) -> Iterator[Chart]:
     """Every input of the plan, and what is proven of it in the loop of what decides."""
-    own, system = {each.input: each for each in result.inputs}, result.spec.effective.system
-    drawings = (
-        Drawing(
-            key=f"input-{i}",
-            name=name,
-            unit=system.units.get(name, ""),
-            curve=curve,
-            band=_input_band(result, own.get(name), curve),
-            limits=_range(own[name].limits) if name in own else None,
-            words=("limits", "proven range in the loop", "plan"),
-        )
-        for i, (name, curve) in enumerate(zip(system.inputs, planned.inputs(result), strict=False))
-    )
-    return [drawing.figure("tube") for drawing in drawings]
+    known, system = {each.input: each for each in result.inputs}, result.spec.effective.system
+    words, (t, curves) = ("limits", "proven range in the loop"), planned.inputs(result)
+    for i, (name, u) in enumerate(zip(system.inputs, curves, strict=False)):
+        own, label = known.get(name), labelled(name, system)
+        band, limits = (None, None) if own is None else (_band(result, own, u), _range(own.limits))
+        yield over_time(f"input-{i}", name, label, (t, u), band=band, limits=limits, words=words, proven=True)
 
 
 def _range(ends: tuple[Fraction, Fraction]) -> Point:
     return float(ends[0]), float(ends[1])
 
 
-def _around(curve: Sequence[Point], below: float, above: float) -> Band:
-    return [(t, v - below) for t, v in curve], [(t, v + above) for t, v in curve]
-
-
-def _input_band(result: Result, own: InputData | None, curve: Sequence[Point]) -> Band:
+def _band(result: Result, own: InputData, u: Array) -> tuple[Array, Array] | None:
     """Around u* by what feedback and adaptation add at most; None where nothing is proven."""
-    found = [] if own is None else [own.bounds[key] for key in result.decided_by if key in own.bounds]
-    if own is None or not found:
+    found = [own.bounds[key] for key in result.decided_by if key in own.bounds]
+    if not found:
         return None
     below = own.plan.least.below - min(each.least for each in found)
-    return _around(curve, below, max(each.greatest for each in found) - own.plan.greatest.above)
+    return u - below, u + max(each.greatest for each in found) - own.plan.greatest.above

@@ -8,7 +8,6 @@ For any other metric what is proven is |S (x - x*)| < radius and every half-widt
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -19,7 +18,7 @@ from tubecert.coordinates import inverse
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import Expression, ExpressionError, free_symbols, parse, symbol
-from tubecert.report.figures_scene import Matrix, Outline
+from tubecert.report.figures_axes import ellipse
 
 
 def widths(result: Result) -> dict[str, float] | None:
@@ -30,40 +29,45 @@ def widths(result: Result) -> dict[str, float] | None:
     return {name: found[name] for name in result.spec.effective.system.states}
 
 
-def tube_outline(result: Result, pair: tuple[int, int]) -> Outline | None:
-    """What the state stays in; None where there is no tube."""
-    tube = result.tube
-    if tube is None:
+def level_set(result: Result) -> Array | None:
+    """For a constant W the shape (n, n) of {d(x*, x) < dbar}, dbar = sqrt(a) rho: {y: y' shape^-1 y < 1}."""
+    tube, metric, W = result.tube, result.metric, _constant(result)
+    if W is None or tube is None or tube.rho_r is None or metric is None or metric.lower is None:
         return None
-    level, W = _level(result, tube), _constant(result)
-    if level is not None and W is not None:
-        return Outline(turn=_root(level**2 * W[np.ix_(pair, pair)]))
+    a = metric.lower.below
+    return np.asarray(a * float(tube.rho) ** 2 * W) if a > 0 else None
+
+
+def tube_outline(result: Result, pair: tuple[int, int]) -> Array | None:
+    """What the state stays in: points (N, 2) counterclockwise around it; None where there is no tube."""
+    if result.tube is None:
+        return None
+    if (shape := level_set(result)) is not None:
+        return ellipse(shape[np.ix_(pair, pair)])
     names, known = result.spec.effective.system.states, widths(result)
-    sides = None if known is None else (known[names[pair[0]]], known[names[pair[1]]])
-    return Outline(turn=_ball(tube, float(tube.rho), pair), sides=sides)
+    ball = ellipse(_ball(result.tube, len(names))[np.ix_(pair, pair)])
+    return ball if known is None else _cut(ball, np.array([known[names[i]] for i in pair]))
 
 
-def _level(result: Result, tube: TubeData) -> float | None:
-    """The distance that is not reached, dbar = sqrt(a) rho."""
-    a = None if result.metric is None else result.metric.lower
-    return None if a is None or tube.rho_r is None or a.below <= 0 else math.sqrt(a.below) * float(tube.rho)
+def _cut(shape: Array, sides: Array) -> Array:
+    """What of a convex shape (N, 2) about the origin lies within `sides` (2,): its points drawn in, and the corners."""
+    drawn_in = shape * np.minimum(1, (sides / np.maximum(np.abs(shape), 1e-300)).min(axis=1))[:, None]
+    edge = np.roll(shape, -1, axis=0) - shape
+    corners = sides * [(1, 1), (-1, 1), (-1, -1), (1, -1)]
+    outward = np.stack([edge[:, 1], -edge[:, 0]], axis=1)
+    inside = (corners @ outward.T <= (outward * shape).sum(axis=1)).all(axis=1)
+    points = np.concatenate([drawn_in, corners[inside]])
+    return np.asarray(points[np.argsort(np.arctan2(points[:, 1] / sides[1], points[:, 0] / sides[0]))])
 
 
-def _ball(tube: TubeData, radius: float, pair: tuple[int, int]) -> Matrix:
-    """The projection of |S y| < radius: y_i reaches sqrt of the diagonal of S^-1 S^-T."""
+def _ball(tube: TubeData, n: int) -> Array:
+    """The shape (n, n) of |S y| < rho: rho^2 S^-1 S^-T."""
+    radius = float(tube.rho)
     if tube.coordinates is None:
-        return (radius, 0.0), (0.0, radius)
+        return np.asarray(radius**2 * np.eye(n))
     rows = inverse([[Fraction(entry) for entry in row] for row in tube.coordinates])
     back = np.array([[float(entry) for entry in row] for row in rows])
-    return _root(radius**2 * (back @ back.T)[np.ix_(pair, pair)])
-
-
-def _root(shape: Array) -> Matrix:
-    """L with L L' = shape, (2, 2): the unit disc becomes {y: y' shape^-1 y < 1}; never quite flat, to be seen."""
-    values, vectors = np.linalg.eigh(shape)
-    least = max(1e-12 * float(values[-1]), 1e-300)
-    (a, b), (c, d) = (vectors * np.sqrt(np.maximum(values, least))).tolist()
-    return (a, b), (c, d)
+    return np.asarray(radius**2 * (back @ back.T))
 
 
 def _constant(result: Result) -> Array | None:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final, Literal
 
+from tubecert.report.figures_axes import Chart
 from tubecert.verdict import Verdict
 
 Kind = Literal["text", "number", "code", "verdict"]
@@ -19,23 +20,6 @@ _ALIKE: Final[Mapping[Verdict, Sequence[str]]] = {
     Verdict.REFUTED: ("contradicted", "falsified", "tube left", "error"),
     Verdict.UNDECIDED: ("no result", "interrupted", "warning"),
 }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Figure:
-    """A figure: SVG that adapts to light and dark, what its colours mean (class, words), and a caption."""
-
-    key: str
-    title: str
-    svg: str
-    legend: tuple[tuple[str, str], ...] = ()
-    caption: str = ""
-
-    @property
-    def told(self) -> str:
-        """A caption that stands without the page: what is drawn, and what each mark is."""
-        shown = ", ".join(words for _, words in self.legend)
-        return f"{self.title}{': ' if shown else ''}{shown}. {self.caption}".rstrip()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +100,7 @@ class Figures:
     """Figures side by side where there is room."""
 
     block: ClassVar[str] = "figures"
-    figures: tuple[Figure, ...]
+    figures: tuple[Chart, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +161,7 @@ class Page:
     caveat: str = ""
 
     @property
-    def figures(self) -> tuple[Figure, ...]:
+    def figures(self) -> tuple[Chart, ...]:
         """Every figure of it."""
         blocks = (block for section in self.sections for block in section.blocks)
         return tuple(each for block in blocks if isinstance(block, Figures) for each in block.figures)
