@@ -527,9 +527,8 @@ def test_the_tube_that_is_drawn_is_as_wide_as_it_is():
 
     result, axes = certified(), Figure().subplots()
     result.plot_tube(axes)
-    [tube] = axes.collections
-    corners = np.vstack([path.vertices for path in tube.get_paths()])
-    widest = np.abs(corners).max(axis=0)
+    [tube] = [patch for patch in axes.patches if patch.get_label() == "tube"]
+    widest = np.abs(tube.get_path().vertices).max(axis=0)
     expected = [min(result.rho, result.half_widths[name]) for name in ("p", "v")]
     np.testing.assert_allclose(widest, expected, rtol=2e-3)
 

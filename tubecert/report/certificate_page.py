@@ -19,7 +19,7 @@ from tubecert.enclosure.constant import Constant
 from tubecert.records import to_json
 from tubecert.report import claimed, reach
 from tubecert.report.certificate_brief import first_blocks, reasons
-from tubecert.report.figures_gains import gain_figures
+from tubecert.report.figures_gains import trade_off
 from tubecert.report.figures_tube import input_figures, state_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.outline import level_set, widths
@@ -170,8 +170,9 @@ def _gains(result: Result) -> Iterator[Block]:
     ]:
         yield Words(text=f"No gains were found for {', '.join(missing)}.")
     yield from reasons(result, [each for each in result.reasons if each.verdict is Verdict.CERTIFIED])
-    if curves := tuple(gain_figures(result)):
-        yield Figures(figures=curves)
+    chart = trade_off(result)
+    if chart is not None and any(mark.kind == "line" for mark in chart.marks):
+        yield Figures(figures=(chart,))
 
 
 def _gains_row(row: Gains) -> tuple[str, ...]:

@@ -29,10 +29,11 @@ _LOOKS: Final[Any] = {
     "axes.titlesize": 12 * _POINTS,
     "axes.edgecolor": "#d5dae0",
     "axes.axisbelow": True,
+    "axes.grid": True,
     "grid.color": "#e4e8ec",
     "grid.linewidth": _POINTS,
-    "xtick.color": "#57606a",
-    "ytick.color": "#57606a",
+    **{f"{axis}tick.{key}.size": 0 for axis in "xy" for key in ("major", "minor")},
+    **{f"{axis}tick.labelcolor": "#57606a" for axis in "xy"},
     "legend.frameon": False,
 }
 Look = Mapping[str, str]
@@ -95,19 +96,16 @@ def painted(ending: str, chart: Chart) -> bytes:
 
 def paint(axes: Axes, chart: Chart) -> None:
     """Axes and marks of a chart, into axes of matplotlib; what a legend may say are their labels."""
-    for which, own in (("x", chart.x), ("y", chart.y)):
+    for name, own in (("x", chart.x), ("y", chart.y)):
         scale, label = "log" if own.log else "linear", _plain(own.label)
-        axes.set(**{f"{which}lim": (own.low, own.high), f"{which}scale": scale, f"{which}label": label})
-        ticks = getattr(axes, f"{which}axis")
-        ticks.set_ticks(own.ticks(), labels=list(map(_plain, own.texts())))
-        ticks.set_ticks([], minor=True)
-    axes.tick_params(length=0)
-    axes.grid(visible=True)
+        axes.set(**{f"{name}scale": scale, f"{name}lim": (own.low, own.high), f"{name}label": label})
+        if own.log or own.names:
+            getattr(axes, f"set_{name}ticks")(own.ticks(), labels=list(map(_plain, own.texts())))
+            getattr(axes, f"set_{name}ticks")([], minor=True)
     known = set[str]()
     for mark in chart.marks:
-        label = "" if mark.words in known else _plain(mark.words)
+        _paint(axes, mark, _plain(mark.words) if mark.words and mark.words not in known else "_")
         known.add(mark.words)
-        _paint(axes, mark, label or "_")
 
 
 def _paint(axes: Axes, mark: Mark, label: str) -> None:

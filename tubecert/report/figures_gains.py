@@ -22,23 +22,20 @@ _FOUND: Final = "Points of a curve were found to serve: computed, not examined b
 _FLOORS: Final = {"identity": ("m1", "least condition number"), "input": ("m2", "least input gain")}
 
 
-def gain_figures(result: Result) -> list[Chart]:
-    """The trade-off of bandwidth and adaptation rate, if the certificate has data for it."""
-    curves = {
-        key: list(section.points())
-        for key, section in result.sections.items()
-        if key in NAMES and len(section.points()) > 1
-    }
-    if not curves:
-        return []
+def trade_off(result: Result) -> Chart | None:
+    """Bandwidths and adaptation rates: curves, as far as the certificate has them, and the gains that were chosen."""
+    curves = {key: list(section.points()) for key, section in result.sections.items() if key in NAMES}
     chosen = [(row, at) for row in rows(result) if (at := _place(row)) is not None]
-    every = [p for points in curves.values() for p in points] + [place for _, place in chosen]
+    every = [*(p for points in curves.values() for p in points), *(place for _, place in chosen)]
+    if not every:
+        return None
     x = Axis.around([p[0] for p in every], "bandwidth ω (rad/s)", log=True)
     y = Axis.around([p[1] for p in every], "adaptation rate Γ", log=True)
     title = "Adaptation rate against bandwidth"
     chart = Chart(key="trade-off", title=title, x=x, y=y, caption=_FOUND)
     for section, points in curves.items():
-        chart.line(points, STYLES[section], NAMES[section])
+        if len(points) > 1:
+            chart.line(points, STYLES[section], NAMES[section])
     for row, place in chosen:
         style, size = (" decides", 6.0) if row.decides else ("", 4.5)
         words, tip = (
@@ -46,7 +43,7 @@ def gain_figures(result: Result) -> list[Chart]:
             f"{NAMES[row.section]}, {row.chosen}: {row.text()}",
         )
         chart.dot(place, STYLES[row.section] + style, words, tip=tip, size=size)
-    return [chart]
+    return chart
 
 
 def _place(row: Gains) -> Point | None:

@@ -40,24 +40,20 @@ def _pairs(result: Result) -> list[tuple[int, int]]:
     return pairs
 
 
-def plane(result: Result, pair: tuple[int, int]) -> Plane:
-    """What is known in the plane of two states, by their places."""
-    system, samples = result.spec.effective.system, result.plan.samples
-    x = np.array(() if samples is None else samples.x, dtype=float).reshape(-1, len(system.states))
-    safe = [_range(result.safe_set[system.states[i]]) for i in pair]
-    return Plane.of(system, pair, x, tube_outline(result, pair), safe)
-
-
 def plane_figure(result: Result, pair: tuple[int, int]) -> Chart:
     """The tube in the plane of two states, by their places."""
-    own, proven = plane(result, pair), result.tube is not None and result.tube.rho_r is not None
+    effective, samples = result.spec.effective, result.plan.samples
+    names = effective.system.states
+    x = np.array(() if samples is None else samples.x, dtype=float).reshape(-1, len(names))
+    safe = [_range(result.safe_set[names[i]]) for i in pair]
+    own = Plane.of(effective.system, pair, x, tube_outline(result, pair), safe)
     witnesses = [
         ((float(at.x[pair[0]]), float(at.x[pair[1]])), f"{reason.claim.title}: {point(result, at)}")
         for reason in result.reasons
         if (at := reason.at) is not None and len(at.x) > max(pair)
     ]
     places = [place for place, _ in witnesses]
-    chart = scene(f"tube-{pair[0]}-{pair[1]}", own, result.spec.effective.obstacles, places, proven=proven)
+    chart = scene(f"tube-{pair[0]}-{pair[1]}", own, effective.obstacles, places, proven=_is_proven(result))
     if len(own.plan):
         words = "start of the plan" if len(own.plan) > 1 else "the plan, an equilibrium"
         chart.dot(own.plan[0], "start", words, tip="start of the plan")
@@ -68,7 +64,7 @@ def plane_figure(result: Result, pair: tuple[int, int]) -> Chart:
 
 def state_figures(result: Result) -> Iterator[Chart]:
     """Every state of the plan with its half-width."""
-    known, proven = widths(result), result.tube is not None and result.tube.rho_r is not None
+    known, proven = widths(result), _is_proven(result)
     words = "safe set", "proven band" if proven else "tube, not proven to stay in the safe set"
     system, (t, curves) = result.spec.effective.system, planned.states(result)
     for i, (name, x) in enumerate(zip(system.states, curves, strict=False)):
@@ -85,6 +81,11 @@ def input_figures(result: Result) -> Iterator[Chart]:
         own, label = known.get(name), labelled(name, system)
         band, limits = (None, None) if own is None else (_band(result, own, u), _range(own.limits))
         yield over_time(f"input-{i}", name, label, (t, u), band=band, limits=limits, words=words, proven=True)
+
+
+def _is_proven(result: Result) -> bool:
+    """Whether the tube is proven to lie in the safe set."""
+    return result.tube is not None and result.tube.rho_r is not None
 
 
 def _range(ends: tuple[Fraction, Fraction]) -> Point:
