@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from functools import partial
 from typing import Final, Literal
@@ -17,7 +17,6 @@ _LONGEST: Final = 60  # characters of h
 _advice = partial(plain, __name__, Relax)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class HalveConstant(Relax):
     """With the constant halved, the least Gamma is `factor` times what it is."""
 
@@ -39,26 +38,19 @@ class PlanRemedy(Said, Tagged):
     __slots__ = ()
 
 
-CorrectPlan = plain(__name__, PlanRemedy, "CorrectPlan", "correct x or u there")
+_remedy = partial(plain, __name__, PlanRemedy)
+CorrectPlan = _remedy("CorrectPlan", "correct x or u there")
+MoreKnots = _remedy("MoreKnots", "give more knots, or integrate the dynamics between them")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class OtherInterpolation(PlanRemedy):
     """With another interpolation of the inputs the defect would be `defect`."""
 
+    says = "with interpolation: {interpolation} it would be {defect:3}"
     interpolation: Literal["hold", "linear"]
     defect: float
 
-    def _told(self) -> str:
-        return f"with interpolation: {self.interpolation} it would be {near(self.defect, 3)}"
 
-
-MoreKnots = plain(
-    __name__, PlanRemedy, "MoreKnots", "give more knots, or integrate the dynamics between them"
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MendPlan(Relax):
     """The plan misses x' = f + B u by up to `defect` (at t, if known), which alone takes `share` of the tube."""
 
@@ -75,7 +67,6 @@ class MendPlan(Relax):
         return f"{misses}, which alone takes {part} the tube: {self.remedy.told()}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RaiseBudget(Relax):
     """A larger budget of boxes may decide it; `proof`: a proof of a synthesis ran out of it."""
 
@@ -92,7 +83,6 @@ ReduceInitialError = _advice("ReduceInitialError", "reduce the initial error")
 EnlargeSafeSet = _advice("EnlargeSafeSet", "enlarge the safe set")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class FitTube(Relax):
     """A tube that fits into the safe set: a half-width of `state`, or without one the radii, of `most` in all."""
 
@@ -106,7 +96,6 @@ class FitTube(Relax):
         return f"{asked} of at most {down(self.most, 4)} would fit"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MeasureTube(Relax):
     """A tube that certifies: within `half_widths`, or where these are none of the same radii in coordinates: auto."""
 
@@ -122,7 +111,6 @@ class MeasureTube(Relax):
         return f"tube: {{{asked}}}, which certifies" + (f" with about {told}" if told else "")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ShrinkSafeSet(Relax):
     """A smaller safe set: to `factor` of its size about its centre, where `rate` works, if that is known."""
 
@@ -136,7 +124,6 @@ class ShrinkSafeSet(Relax):
         return f"{shrunk}, where {near(self.rate)} works"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class LowerRate(Relax):
     """A lower rate of the metric: `to` that one, where it is known to be supported."""
 
@@ -149,7 +136,6 @@ class LowerRate(Relax):
 OtherMetric = _advice("OtherMetric", "give another dual metric")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DeclareMetricBound(Relax):
     """A bound of M that holds."""
 
@@ -163,7 +149,6 @@ class DeclareMetricBound(Relax):
         return f"declare {self.side}: {rounded(self.value, 6)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DeclareUncertaintyBound(Relax):
     """A bound of the uncertainty that holds."""
 
@@ -174,24 +159,18 @@ class DeclareUncertaintyBound(Relax):
         return f"declare {self.constant}: {'-' if self.value is None else up(self.value, 6)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class AskForRateBelow(Relax):
     """Ask for a rate below `rate`."""
 
+    says = "ask for a rate below {rate}"
     rate: Fraction
 
-    def _told(self) -> str:
-        return f"ask for a rate below {near(self.rate)}"
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class AskForRateUpTo(Relax):
     """`rate` works on this safe set."""
 
+    says = "a rate up to {rate}, which works on this box"
     rate: Fraction
-
-    def _told(self) -> str:
-        return f"a rate up to {near(self.rate)}, which works on this box"
 
 
 GiveInput = _advice("GiveInput", "give it an input")
@@ -204,24 +183,18 @@ ConstantInputs = _advice(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class HigherDegree(Relax):
     """A degree of W above `degree`, or none asked for."""
 
+    says = "a degree above {degree}, or auto"
     degree: int
 
-    def _told(self) -> str:
-        return f"a degree above {self.degree}, or auto"
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RaiseConditionNumber(Relax):
     """A higher limit of the condition number."""
 
+    says = "raise condition_number to {to:4}"
     to: float
-
-    def _told(self) -> str:
-        return f"raise condition_number to {near(self.to, 4)}"
 
 
 def advice(items: Sequence[Relax], h: Sequence[str] = ()) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from typing import Literal
@@ -26,7 +25,6 @@ StraightGeodesics = _assumption(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ExactGeodesics(Assumption):
     """The controller finds the minimising geodesic exactly, and it is unique in the tube.
 
@@ -56,14 +54,11 @@ StartAtRest = _assumption(
 HardProjection = _assumption("HardProjection", "the projection is hard")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SmoothProjection(Assumption):
     """The projection is smooth with this layer."""
 
+    says = "the projection is smooth with layer {layer}"
     layer: Fraction
-
-    def _told(self) -> str:
-        return f"the projection is smooth with layer {near(self.layer)}"
 
 
 PerfectState = _assumption(
@@ -73,14 +68,11 @@ FirstOrderFilter = _assumption("FirstOrderFilter", "the filter is first order, C
 ForAllTime = _assumption("ForAllTime", "the claim is for all t >= 0")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class UpToHorizon(Assumption):
     """The claim is for 0 <= t <= `horizon`, in s."""
 
+    says = "the claim is for 0 <= t <= {horizon} s"
     horizon: Fraction
-
-    def _told(self) -> str:
-        return f"the claim is for 0 <= t <= {near(self.horizon)} s"
 
 
 UncertaintyAsDeclared = _assumption(
@@ -88,7 +80,6 @@ UncertaintyAsDeclared = _assumption(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class UncertaintyAsGiven(Assumption):
     """The uncertainty is the expression of the specification, or any other within the certificate's h, h_x, h_t."""
 
@@ -100,7 +91,6 @@ class UncertaintyAsGiven(Assumption):
         return given + (others if self.any_within_bounds else "")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class WindWithin(Assumption):
     """Beside the inputs acts E(x) w with |w| <= `bound`, else arbitrary.
 

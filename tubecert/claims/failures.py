@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
 
-from tubecert.claims.family import Claim, Reason, Said, plain
+from tubecert.claims.family import Claim, Member, Reason, Said, plain
 from tubecert.digits import near
 from tubecert.records import Tagged
 from tubecert.verdict import Verdict
@@ -21,28 +19,21 @@ class Outcome(Said, Tagged):
 Proven = plain(__name__, Outcome, "Proven", "proven")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class NoProposal(Outcome):
     """The route proposed nothing; `status` is what its solver said."""
 
+    says = "{route}: {status}"
     route: str
     status: str
 
-    def _told(self) -> str:
-        return f"{self.route}: {self.status}"
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class WrongShape(Outcome):
     """The route proposed coefficients of a wrong shape."""
 
+    says = "{route} gave coefficients of a wrong shape"
     route: str
 
-    def _told(self) -> str:
-        return f"{self.route} gave coefficients of a wrong shape"
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class NotProven(Outcome):
     """The proposal, rounded, could not be proven, or is refuted: `condition` failed."""
 
@@ -54,17 +45,14 @@ class NotProven(Outcome):
         return f"{self.route}: {Reason(claim=self.condition, verdict=self.verdict).message}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionUnbounded(Outcome):
     """The condition number of what was proposed could not be bounded."""
 
+    says = "{route}: the condition number could not be bounded"
     route: str
 
-    def _told(self) -> str:
-        return f"{self.route}: the condition number could not be bounded"
 
-
-class Failure(Tagged):
+class Failure(Member, Tagged):
     """Why a synthesis came to nothing."""
 
     __slots__ = ()
@@ -74,7 +62,7 @@ class Failure(Tagged):
         return self._told(reason)
 
     def _told(self, reason: Reason) -> str:
-        raise NotImplementedError
+        return self.said()
 
 
 def rank(reason: Reason) -> str:
@@ -83,17 +71,15 @@ def rank(reason: Reason) -> str:
     return "B loses rank in the safe set" if refuted else "B could not be proven of full rank"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RankUnproven(Failure):
     """B could not be proven of full rank, or is proven to lose it at the witness."""
 
-    tag: ClassVar[str] = "rank_of_B"
+    tag = "rank_of_B"
 
     def _told(self, reason: Reason) -> str:
         return rank(reason)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class UncontrollableMode(Failure):
     """A mode of the linearisation at the witness that no input reaches: no metric has a rate above `limit`, in 1/s."""
 
@@ -107,7 +93,6 @@ class UncontrollableMode(Failure):
         return f"{mode}: no metric has a rate above {near(self.limit, 12)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class VariableForbidden(Failure):
     """C3 forbids that W depends on `variable`; it may depend on those `permitted`."""
 
@@ -119,15 +104,12 @@ class VariableForbidden(Failure):
         return f"W cannot depend on {self.variable}: C3 (the Killing condition) permits {permitted}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class NoFrame(Failure):
     """No frame of vector fields that commute with the columns of B was found."""
 
-    def _told(self, reason: Reason) -> str:
-        return "no frame of vector fields that commute with the columns of B was found"
+    says = "no frame of vector fields that commute with the columns of B was found"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class NotWritable(Failure):
     """The metric is beyond what a specification can hold; `code` is that of the finding."""
 
@@ -139,7 +121,6 @@ class NotWritable(Failure):
         return f"the metric cannot be written: {title(self.code)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class NotProvenAsWritten(Failure):
     """The metric, read back as written, could not be proven; `condition` is the claim that failed."""
 
@@ -149,19 +130,14 @@ class NotProvenAsWritten(Failure):
         return f"the metric as written could not be proven: {self.condition.why(reason)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionNumber(Failure):
     """The least condition number found at `rate` is above the limit that was given."""
 
+    says = "the least condition number found at rate {rate} is {condition_number:5}, above the limit"
     rate: Fraction
     condition_number: float
 
-    def _told(self, reason: Reason) -> str:
-        number = near(self.condition_number, 5)
-        return f"the least condition number found at rate {near(self.rate)} is {number}, above the limit"
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class NothingFound(Failure):
     """No attempt led to a metric; the attempts stand in `result.synthesis`."""
 
@@ -178,7 +154,6 @@ class NothingFound(Failure):
         return f"no metric was found: {self.attempts} attempts by {routes}, degree {degrees}{last}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class NoneCertified(Failure):
     """Metrics were found at `compared` rates from `slowest` to `fastest`, and none certifies.
 

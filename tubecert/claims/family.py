@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, TypeVar
+from fractions import Fraction
+from typing import ClassVar, Literal, TypeVar, dataclass_transform
 
+from tubecert.digits import near
 from tubecert.enclosure.constant import Witness
 from tubecert.records import INLINE, Tagged
 from tubecert.verdict import Verdict
@@ -19,7 +21,36 @@ CONSTANTS: dict[
 ] = {}  # symbol and words of each: `bounds.constants` says what they are called
 
 
-class Claim(Tagged):
+class _Shown:
+    """A field in a sentence: a number as `near` writes it, with as many digits as the format says."""
+
+    def __init__(self, value: object) -> None:
+        self.value = value
+
+    def __format__(self, digits: str) -> str:
+        if isinstance(self.value, (float, Fraction)):
+            return near(self.value, int(digits or 6))
+        return str(self.value)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
+class Member:
+    """Base of families: every member is a frozen record, whose sentence `says` has fields of it in braces."""
+
+    __slots__ = ()
+    says: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if Tagged not in cls.__bases__:
+            dataclass(frozen=True, kw_only=True)(cls)
+
+    def said(self) -> str:
+        """The sentence."""
+        return self.says.format_map({name: _Shown(value) for name, value in vars(self).items()})
+
+
+class Claim(Member, Tagged):
     """Something that is proven, refuted or left undecided; `name` is what it is called."""
 
     __slots__ = ()
@@ -39,21 +70,20 @@ class Claim(Tagged):
         return self.name
 
     def _why(self, reason: Reason) -> str:
-        raise NotImplementedError
+        return self.said()
 
 
-class Said:
-    """Something that says one thing: `says`, or what a member makes of its parameters."""
+class Said(Member):
+    """What is told whatever is known: the sentence, or what a member makes of its parameters."""
 
     __slots__ = ()
-    says: ClassVar[str] = ""
 
     def told(self) -> str:
         """What it says."""
         return self._told()
 
     def _told(self) -> str:
-        return self.says
+        return self.said()
 
 
 class Relax(Said, Tagged):
@@ -73,8 +103,7 @@ M = TypeVar("M", bound=Said)
 
 def plain(module: str, family: type[M], name: str, says: str) -> type[M]:
     """A member of a family without parameters, which says one thing; its tag is its name with underscores."""
-    made = type(name, (family,), {"says": says, "__doc__": says, "__module__": module})
-    return dataclass(frozen=True, slots=True, kw_only=True)(made)
+    return type(name, (family,), {"says": says, "__doc__": says, "__module__": module})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +114,11 @@ class Reason:
     verdict: Verdict
     at: Witness | None = None
     relax: tuple[Relax, ...] = ()
+
+    @property
+    def when(self) -> str:
+        """The time at which the point shows it, at the end of a sentence."""
+        return "" if self.at is None or self.at.t is None else f", at t = {near(self.at.t)}"
 
     @property
     def message(self) -> str:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
-from typing import ClassVar, Literal
+from typing import Literal
 
 from tubecert.claims.conditions import SAYS, SECTIONS, condition_name, equation
 from tubecert.claims.failures import Failure, rank
@@ -20,44 +19,40 @@ _OF_PREDICTOR = ("26c", "distance")  # conditions that another predictor may sat
 _WITHOUT_MARGIN = ("wind_not_covered", "gain_not_covered", "proven_gains", "any_gains")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RankOfB(Claim):
     """B(x) has full rank on the safe set."""
 
-    tag: ClassVar[str] = "rank_of_B"
-    name: ClassVar[str] = "rank of B"
+    tag = "rank_of_B"
+    name = "rank of B"
 
     def _why(self, reason: Reason) -> str:
         return rank(reason)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MetricFound(Claim):
     """A metric was found; `failure` says why not."""
 
-    name: ClassVar[str] = "metric synthesis"
+    name = "metric synthesis"
     failure: Failure
 
     def _why(self, reason: Reason) -> str:
         return self.failure.told(reason)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MetricDefinite(Claim):
     """C1: W(x) is positive definite on the safe set."""
 
-    name: ClassVar[str] = "metric, definiteness"
+    name = "metric, definiteness"
 
     def _why(self, reason: Reason) -> str:
         refuted = reason.verdict is Verdict.REFUTED
         return "W is not positive definite (C1)" if refuted else "W could not be proven positive (C1)"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MetricKilling(Claim):
     """C3: the Lie derivative of W along the column of `input` vanishes; `residual` is an entry of it at the witness."""
 
-    name: ClassVar[str] = "metric, inputs"
+    name = "metric, inputs"
     input: str
     residual: float | None = None
 
@@ -68,11 +63,10 @@ class MetricKilling(Claim):
         return f"{condition} fails for input {self.input}: its residual is {near(self.residual, 3)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MetricContraction(Claim):
     """C2 at `rate`, in 1/s; `largest_rate` encloses the supremum of the rates that the metric supports."""
 
-    name: ClassVar[str] = "metric, contraction"
+    name = "metric, contraction"
     rate: Fraction
     largest_rate: Constant
 
@@ -89,11 +83,10 @@ class MetricContraction(Claim):
         return f"C2 fails at rate {near(self.rate)}: {supported}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MetricBound(Claim):
     """The bound of M on the safe set that is `declared`; the eigenvalue is proven to reach `reaches`."""
 
-    name: ClassVar[str] = "declared bounds of the metric"
+    name = "declared bounds of the metric"
     side: Side
     declared: Fraction
     reaches: float | None
@@ -107,11 +100,10 @@ class MetricBound(Claim):
 METRIC_CLAIMS = (MetricDefinite, MetricContraction, MetricKilling)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class TubeRadius(Claim):
     """There is a rho >= sqrt(A/a)|x0* - x0| + eps + rho_a with a, A of the tube itself; `obstacle` says why not."""
 
-    name: ClassVar[str] = "radius of the tube"
+    name = "radius of the tube"
     obstacle: Literal["out_of_range", "metric_unbounded", "not_settled"]
     radius: Fraction
 
@@ -126,21 +118,17 @@ class TubeRadius(Claim):
                 return f"{rho} did not settle: it grows with the tube beyond {near(self.radius)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class PlanBounded(Claim):
     """The curve between the knots of the plan can be bounded."""
 
-    name: ClassVar[str] = _IN_SAFE_SET
-
-    def _why(self, reason: Reason) -> str:
-        return "the curve between the plan's knots could not be bounded: two of its times may nearly coincide"
+    name = _IN_SAFE_SET
+    says = "the curve between the plan's knots could not be bounded: two of its times may nearly coincide"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class TubeInSafeSet(Claim):
     """Assumption 1; the tube of `radius` leaves through the bound of `state` on `side`, by `excess`."""
 
-    name: ClassVar[str] = _IN_SAFE_SET
+    name = _IN_SAFE_SET
     radius: Fraction
     state: str
     side: Side
@@ -148,47 +136,43 @@ class TubeInSafeSet(Claim):
 
     def _why(self, reason: Reason) -> str:
         lies = "leaves" if reason.verdict is Verdict.REFUTED else "could not be proven to stay in"
-        when = "" if reason.at is None or reason.at.t is None else f", at t = {near(reason.at.t)}"
         excess = f", by {near(self.excess, 3)}" if self.excess > 0 else ""
-        return f"the tube {lies} the safe set through the {self.side} bound of {self.state}{excess}{when}"
+        return (
+            f"the tube {lies} the safe set through the {self.side} bound of {self.state}{excess}{reason.when}"
+        )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class PlanInSafeSet(Claim):
     """The plan lies in the safe set; it leaves through the bound of `state` on `side`, by `excess`."""
 
-    name: ClassVar[str] = "the plan lies in the safe set"
+    name = "the plan lies in the safe set"
     state: str
     side: Side
     excess: float
 
     def _why(self, reason: Reason) -> str:
-        when = "" if reason.at is None or reason.at.t is None else f", at t = {near(reason.at.t)}"
         by = f"the {self.side} bound of {self.state}, by {near(self.excess, 3)}"
-        return f"the plan itself leaves the safe set through {by}{when}"
+        return f"the plan itself leaves the safe set through {by}{reason.when}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class HalfWidthFits(Claim):
     """The safe set has room for a half-width; that of `state` exceeds what the plan leaves on `side` by `excess`."""
 
-    name: ClassVar[str] = "the half-widths fit into the safe set"
+    name = "the half-widths fit into the safe set"
     state: str
     side: Side
     half_width: Fraction
     excess: float
 
     def _why(self, reason: Reason) -> str:
-        when = "" if reason.at is None or reason.at.t is None else f", at t = {near(reason.at.t)}"
-        room = f"the plan leaves to the {self.side} bound of {self.state} in the safe set{when}"
+        room = f"the plan leaves to the {self.side} bound of {self.state} in the safe set{reason.when}"
         return f"half_widths.{self.state} is {near(self.half_width)}, {near(self.excess, 3)} more than {room}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class StartInTube(Claim):
     """The start lies in the tube; in `state` it is `off` from the plan's, and `half_width` is asked for."""
 
-    name: ClassVar[str] = "the start lies in the tube"
+    name = "the start lies in the tube"
     state: str
     off: float
     half_width: Fraction
@@ -201,7 +185,6 @@ class StartInTube(Claim):
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ConstantBounded(Claim):
     """The constant of this name is bounded over the tube."""
 
@@ -214,7 +197,6 @@ class ConstantBounded(Claim):
         return unbounded(self.constant)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class UncertaintyBound(Claim):
     """The bound of `h`, `h_x` or `h_t` that is `declared` covers the expression, which reaches `reaches`."""
 
@@ -241,7 +223,6 @@ def reached(value: float | None) -> str:
     return "infinity" if value is None else near(value, 8)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ObstacleCleared(Claim):
     """The tube stays clear of obstacle number `obstacle` (from 1); `clearance` encloses by how much."""
 
@@ -261,7 +242,6 @@ class ObstacleCleared(Claim):
         return f"{told}; at its nearest by {near(high, 4)}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class InputWithinLimits(Claim):
     """An input of the plan and of the loop stays within its limits; on `side` it may reach `reaches`, beyond `limit`.
 
@@ -299,7 +279,6 @@ def input_title(name: str) -> str:
     return f"limits of {name}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class GainsSuffice(Claim):
     """The gains of a section satisfy its conditions; `margins` are what is proven to be left of each.
 
@@ -325,7 +304,6 @@ class GainsSuffice(Claim):
         return f"{binds}proven margins: {margins}{more if self.binds == '26b' else ''}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionHolds(Claim):
     """A condition of a section that is not proven, by `margin`, or by what is `needed` and `allowed`.
 
