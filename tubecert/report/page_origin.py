@@ -58,9 +58,7 @@ def _facts(effective: Effective, overrides: Mapping[str, object]) -> Iterator[tu
         yield f"table {name}", _points(table)
     if model.units:
         yield "units", ", ".join(f"{name}: {unit}" for name, unit in sorted(model.units.items()))
-    safe = effective.part("safe_set")
-    sides = [(name, map(end, map(Fraction, safe[name]))) for name in model.states if name in safe]
-    yield "safe set", ", ".join(f"{name} in [{', '.join(ends)}]" for name, ends in sides)
+    yield "safe set", safe_set(effective)
     if bounds := effective.uncertainty.bounds:
         yield "bounds declared", _list(bounds)
     told, any_of = effective.part("trajectory"), effective.trajectory.kind == "any"
@@ -72,6 +70,12 @@ def _facts(effective: Effective, overrides: Mapping[str, object]) -> Iterator[tu
         yield "obstacle", _list(obstacle)
     if overrides:
         yield "overridden by the command", _list(overrides)
+
+
+def safe_set(effective: Effective) -> str:
+    """The box that the tube is to stay in: `x in [-1, 1], ...`."""
+    sides = effective.system.ordered(effective.part("safe_set")).items()
+    return ", ".join(f"{name} in [{', '.join(end(Fraction(at)) for at in ends)}]" for name, ends in sides)
 
 
 def _points(table: TableView) -> str:
