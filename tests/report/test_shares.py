@@ -29,7 +29,7 @@ conditions: {decides: B}
 def test_the_causes_make_up_what_the_margin_leaves_each_as_by_hand():
     sealed = proven(WINDY)
     result = Certificate.from_json(sealed).result
-    told = {each.key: {part.cause: part.share for part in each.shares} for each in filled(result)}
+    told = filled(result)
     assert set(told) == {"no_adaptation", "distance"}, "A compares other quantities"
     for key, causes in told.items():
         total, margin = sum(causes.values()), result.sections[key].decisive(asked=False).margins[key]

@@ -6,7 +6,7 @@ rounded up, bounds from below down.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
 from math import isfinite
 
@@ -82,7 +82,7 @@ def page_of(certificate: Certificate, simulated: Simulated | None = None, *, all
         claim=_claim(result) if holds else "",
         meaning=_meaning(result),
         caveat=claimed.NOT_RECHECKED,
-        sections=tuple(islice(_sections(certificate, simulated), None if all_of_it else 1)),
+        sections=tuple(islice(Section.each(_sections(certificate, simulated)), None if all_of_it else 1)),
     )
 
 
@@ -120,34 +120,23 @@ def _meaning(result: Result) -> str:
             return "This is neither proven nor refuted; it must not be relied on."
 
 
-def _sections(certificate: Certificate, simulated: Simulated | None) -> Iterator[Section]:
+def _sections(
+    certificate: Certificate, simulated: Simulated | None
+) -> Iterator[tuple[str, str, Iterable[Block]]]:
     result = certificate.result
-    yield Section(key="brief", title="In brief", blocks=first_blocks(result))
-    if result.sections:
-        yield Section(key="gains", title="Gains", blocks=tuple(_gains(result)))
-    if blocks := tuple(_filled(result)):
-        yield Section(key="fills", title="What fills the tube", blocks=blocks)
-    if blocks := tuple(_tube(result)):
-        yield Section(key="tube", title="Safe set" if result.tube is None else "Tube", blocks=blocks)
-    if blocks := tuple(_inputs(result)):
-        yield Section(key="inputs", title="Inputs", blocks=blocks)
-    if result.sections:
-        yield Section(key="conditions", title="Conditions and margins", blocks=tuple(_conditions(result)))
-    if simulated is not None:
-        yield Section(key="simulation", title="Simulation", blocks=tuple(simulated_blocks(simulated)))
-    yield Section(key="rests-on", title="What this rests on", blocks=tuple(_rests_on(result)))
-    if result.metric is not None:
-        yield Section(key="metric", title="Metric", blocks=tuple(_metric(result.metric, result.tube)))
-    if result.constants:
-        yield Section(key="constants", title="Constants over the tube", blocks=tuple(_constants(result)))
-    yield Section(
-        key="system",
-        title="The specification",
-        blocks=tuple(system(result.spec.effective, to_json(result.overrides))),
-    )
-    yield Section(key="provenance", title="Provenance", blocks=tuple(provenance(certificate)))
-    again = check_again(_NOTES)
-    yield Section(key="check", title="Check it again", blocks=tuple(again))
+    yield "brief", "In brief", first_blocks(result)
+    yield "gains", "Gains", _gains(result)
+    yield "fills", "What fills the tube", _filled(result)
+    yield "tube", "Safe set" if result.tube is None else "Tube", _tube(result)
+    yield "inputs", "Inputs", _inputs(result)
+    yield "conditions", "Conditions and margins", _conditions(result)
+    yield "simulation", "Simulation", simulated_blocks(simulated)
+    yield "rests-on", "What this rests on", _rests_on(result)
+    yield "metric", "Metric", _metric(result.metric, result.tube)
+    yield "constants", "Constants over the tube", _constants(result)
+    yield "system", "The specification", system(result.spec.effective, to_json(result.overrides))
+    yield "provenance", "Provenance", provenance(certificate)
+    yield "check", "Check it again", check_again(_NOTES)
 
 
 # -- section by section
@@ -162,12 +151,12 @@ def gains_table(result: Result) -> Table | None:
 
 
 def _gains(result: Result) -> Iterator[Block]:
-    found = list(rows(result))
+    if not result.sections:
+        return
     if (table := gains_table(result)) is not None:
         yield table
-    if missing := [
-        NAMES[key] for key in NAMES if key in result.sections and all(r.section != key for r in found)
-    ]:
+    found = {row.section for row in rows(result)}
+    if missing := [NAMES[key] for key in NAMES if key in result.sections and key not in found]:
         yield Words(text=f"No gains were found for {', '.join(missing)}.")
     yield from reasons(result, [each for each in result.reasons if each.verdict is Verdict.CERTIFIED])
     chart = trade_off(result)
@@ -189,12 +178,13 @@ def _gains_row(row: Gains) -> tuple[str, ...]:
 def _filled(result: Result) -> Iterator[Block]:
     """What fills the tube of every kind that is certified, a column each."""
     found = filled(result)
-    causes = dict.fromkeys(each.cause for kind in found for each in kind.shares)
-    told = [{each.cause: each.share for each in kind.shares} for kind in found]
+    causes = dict.fromkeys(cause for shares in found.values() for cause in shares)
     if found:
         yield Table(
-            columns=("cause", *(NAMES[kind.key] for kind in found)),
-            rows=tuple((Cell(text=cause), *(_share(own.get(cause)) for own in told)) for cause in causes),
+            columns=("cause", *(NAMES[key] for key in found)),
+            rows=tuple(
+                (Cell(text=each), *(_share(own.get(each)) for own in found.values())) for each in causes
+            ),
             note=_SHARES,
         )
 
@@ -306,7 +296,9 @@ def _rests_on(result: Result) -> Iterator[Block]:
     yield Items(title="Assumed, not proven", items=tuple(item.told() for item in result.assumptions))
 
 
-def _metric(metric: MetricData, tube: TubeData | None) -> Iterator[Block]:
+def _metric(metric: MetricData | None, tube: TubeData | None) -> Iterator[Block]:
+    if metric is None:
+        return
     facts = [("verdict", str(metric.verdict)), ("rate", f"{exact(metric.rate)} 1/s")]
     if metric.largest_rate is not None:
         facts.append(("supports rates up to", f"{down(metric.largest_rate.below, 7)} 1/s"))
@@ -337,6 +329,8 @@ def _entries(metric: MetricData) -> str:
 
 
 def _constants(result: Result) -> Iterator[Block]:
+    if not result.constants:
+        return
     yield Table(
         columns=("symbol", "meaning", "proven", "unit", "equation", "gap"),
         rows=tuple(_constant(result, name, result.constants[name]) for name in _order(result.constants)),

@@ -19,7 +19,7 @@ from tubecert.digits import UNKNOWN, down, exact, percent, up
 from tubecert.records import exact_json
 from tubecert.report.claimed import NOT_RECHECKED, size
 from tubecert.report.gains import gains_text
-from tubecert.report.page import Cell, Facts, Page, Section, Table
+from tubecert.report.page import Block, Cell, Facts, Page, Section, Table
 from tubecert.report.quantities import (
     AnyCertificate,
     AnyResult,
@@ -124,25 +124,22 @@ def page_of(comparison: Comparison) -> Page:
         verdict="",
         summary=f"{len(comparison.sides)} certificates{differ or ' of the same specification'}",
         meaning=NOT_RECHECKED,
-        sections=tuple(_sections(comparison)),
+        sections=tuple(Section.each(_sections(comparison))),
         about="comparison",
     )
 
 
-def _sections(comparison: Comparison) -> Iterator[Section]:
+def _sections(comparison: Comparison) -> Iterator[tuple[str, str, list[Block]]]:
     plain = [each for each in comparison.quantities if not each.section]
     kinds = dict.fromkeys(each.section for each in comparison.quantities if each.section)
     rows = [*_verdicts(comparison), *(_kind(comparison, key) for key in kinds)]
     rows += (_quantity(comparison, each) for each in plain if _at_a_glance(each))
-    keys = Facts.of([("differ", ", ".join(comparison.differences))], ("differ",))
-    differ = (keys,) if comparison.differences else ()
-    yield Section(key="glance", title="At a glance", blocks=(_table(comparison, rows), *differ))
+    differ = Facts.of([("differ", ", ".join(comparison.differences))], ("differ",))
+    yield "glance", "At a glance", [_table(comparison, rows), *([differ] if comparison.differences else [])]
     more = [each for each in comparison.quantities if each.name not in ("verdict", "failed")]
     rows = [_quantity(comparison, each) for each in more if each.section or not _at_a_glance(each)]
-    if rows:
-        yield Section(key="numbers", title="Further numbers", blocks=(_table(comparison, rows),))
-    differing = _differing(comparison)
-    yield Section(key="differences", title="What differs in the specification", blocks=(differing,))
+    yield "numbers", "Further numbers", [_table(comparison, rows)] if rows else []
+    yield "differences", "What differs in the specification", [_differing(comparison)]
 
 
 def _at_a_glance(quantity: Quantity) -> bool:

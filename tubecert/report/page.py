@@ -6,7 +6,7 @@ Every text is plain text: who shows it escapes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final, Literal
 
@@ -104,19 +104,11 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Picture:
-    """An image as a data URI, with what it shows."""
-
-    title: str
-    source: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Pictures:
-    """Images that were drawn elsewhere."""
+    """Images that were drawn elsewhere, as data URIs, by what they show."""
 
     block: ClassVar[str] = "pictures"
-    pictures: tuple[Picture, ...]
+    pictures: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,6 +133,13 @@ class Section:
     key: str
     title: str
     blocks: tuple[Block, ...]
+
+    @classmethod
+    def each(cls, parts: Iterable[tuple[str, str, Iterable[Block]]]) -> Iterator[Section]:
+        """Those of the parts, by key and title, that have blocks."""
+        for key, title, made in parts:
+            if blocks := tuple(made):
+                yield cls(key=key, title=title, blocks=blocks)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,7 @@ from base64 import b64encode
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from tubecert.report.page import Block, Picture, Pictures, Words
+from tubecert.report.page import Block, Pictures, Words
 
 TITLES: Mapping[str, str] = {
     "states": "States over time",
@@ -32,12 +32,10 @@ class Simulated:
     figures: Mapping[str, bytes]
 
 
-def simulated_blocks(found: Simulated) -> Iterator[Block]:
-    """What came of it, and the figures."""
+def simulated_blocks(found: Simulated | None) -> Iterator[Block]:
+    """What came of it, and the figures; nothing where there was none."""
+    if found is None:
+        return
     yield Words(text=_PROVES_NOTHING.format(outcome=found.outcome))
-    yield Pictures(
-        pictures=tuple(
-            Picture(title=TITLES[name], source=f"data:image/png;base64,{b64encode(data).decode()}")
-            for name, data in found.figures.items()
-        )
-    )
+    images = ((name, b64encode(data).decode()) for name, data in found.figures.items())
+    yield Pictures(pictures={TITLES[name]: f"data:image/png;base64,{image}" for name, image in images})

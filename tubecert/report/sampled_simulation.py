@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Final
 
 from tubecert.digits import short, up
@@ -19,19 +19,20 @@ _FIRST: Final = 2  # of what broke, on the first screen
 
 def page_of(own: Campaign) -> Page:
     """The page of a campaign."""
-    broken = [Reason(verdict="falsified", claim=each.of, message=_told(each)) for each in own.violations]
-    more = Section(key="broken", title="Everything that broke", blocks=tuple(broken))
     return Page(
         name=own.setting.spec.name,
         verdict=own.outcome,
         summary=_because(own),
         meaning=CAVEAT,
-        sections=(
-            Section(key="runs", title="Runs", blocks=(*broken[:_FIRST], *_runs(own))),
-            *([more] if len(broken) > _FIRST else []),
-        ),
+        sections=tuple(Section.each(_sections(own))),
         about="simulation",
     )
+
+
+def _sections(own: Campaign) -> Iterator[tuple[str, str, Iterable[Block]]]:
+    broken = [Reason(verdict="falsified", claim=each.of, message=_told(each)) for each in own.violations]
+    yield "runs", "Runs", (*broken[:_FIRST], *_runs(own))
+    yield "broken", "Everything that broke", broken if len(broken) > _FIRST else ()
 
 
 def _runs(own: Campaign) -> Iterator[Block]:

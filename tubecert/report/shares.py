@@ -11,7 +11,6 @@ uncertainty, and for the margin.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 
 from tubecert.bounds.constants import EVERY
@@ -35,50 +34,39 @@ _CAUSES: Mapping[str, str] = {
     "adaptation": "the error of the adaptation",
     "wind_estimate": "wind that the estimate takes for uncertainty",
 }
-_START = "the start, until the filter has learned the uncertainty"
-_START_ALONE = "the start, until the feedback has made it good"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Share:
-    """What a cause takes of the tube, at most."""
+def filled(result: Result) -> dict[str, dict[str, float]]:
+    """What each cause takes at most, the most first, for every kind that is certified and whose causes are known.
 
-    cause: str
-    share: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Filled:
-    """What fills the tube of one kind, by the key of the kind; the largest share first."""
-
-    key: str
-    shares: tuple[Share, ...]
+    These are 0 and B.
+    """
+    found = {key: dict(_of_kind(result, key)) for key in result.sections}
+    return {key: shares for key, shares in found.items() if shares}
 
 
-def filled(result: Result) -> list[Filled]:
-    """Every kind that is certified and whose causes are known: 0 and B."""
-    found = (Filled(key=key, shares=tuple(_of_kind(result, key))) for key in result.sections)
-    return [each for each in found if each.shares]
-
-
-def _of_kind(result: Result, key: str) -> list[Share]:
-    section, recipe = result.sections[key], result.proof.of.get(key)
-    if section.verdict is not Verdict.CERTIFIED or recipe is None:
-        return []
+def _of_kind(result: Result, key: str) -> list[tuple[str, float]]:
+    section, recipe, n = result.sections[key], result.proof.of.get(key), _numbers(result)
     pair = section.decisive(asked=result.asked)
-    n = _numbers(result)
-    if n is None or pair is None:
+    if section.verdict is not Verdict.CERTIFIED or recipe is None or n is None or pair is None:
         return []
     whole = n.lam * reach(n)
     causes = {name: push / whole for name, push in _pushes(result, n, recipe)}
     if not causes:
         return []
-    parts = [Share(cause=_CAUSES[name], share=float(each.hi)) for name, each in causes.items()]
     used = 1 - min(margin.below for margin in pair.margins.values())
     start = used - float(sum(causes.values(), Interval.of(0)).lo)
-    began = _START_ALONE if isinstance(recipe, NoGains) else _START
-    told = [each for each in [*parts, Share(cause=began, share=start)] if each.share > _LEAST]
-    return sorted(told, key=lambda each: -each.share)
+    parts = [*((_CAUSES[name], float(each.hi)) for name, each in causes.items()), (_began(recipe), start)]
+    return sorted((each for each in parts if each[1] > _LEAST), key=lambda each: -each[1])
+
+
+def _began(recipe: Recipe) -> str:
+    until = (
+        "the feedback has made it good"
+        if isinstance(recipe, NoGains)
+        else "the filter has learned the uncertainty"
+    )
+    return f"the start, until {until}"
 
 
 def _pushes(result: Result, n: Numbers[Interval], recipe: Recipe) -> Iterator[tuple[str, Interval]]:

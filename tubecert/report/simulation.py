@@ -52,17 +52,12 @@ class _Part:
 def page_of(data: Campaign) -> Page:
     """The page of a campaign."""
     parts = list(_parts(data))
-    sections = (
-        Section(key=key, title=title, blocks=blocks)
-        for key, title, made in _sections(data, parts)
-        if (blocks := tuple(made))
-    )
     return Page(
         name=data.setting.spec.name,
         verdict=data.outcome,
         summary=_because(data, [part.comparison for part in parts if part.loop.tested]),
         meaning=CAVEAT,
-        sections=tuple(sections),
+        sections=tuple(Section.each(_sections(data, parts))),
         about="simulation",
     )
 
