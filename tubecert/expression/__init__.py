@@ -11,6 +11,7 @@ yes.
 | `text` | graph -> text in the grammar of the specification |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
 | `meant`, `elsewhere` | which known word a typing error, or a word of other formats and languages, stands for |
+| `balls` | values as balls |
 | `number` | text -> rational number, pi and degrees rounded |
 | `owed` | text with the obligations that folding dropped |
 | `zero` | proves that an expression vanishes identically |

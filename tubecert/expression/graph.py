@@ -235,76 +235,31 @@ def sqrt(e: Expression) -> Expression:
     return _node("sqrt", (e,))
 
 
-def sin(e: Expression) -> Expression:
-    """Sine."""
-    return ZERO if e is ZERO else _node("sin", (e,))
+def _smooth(op: str, *known: Expression) -> Callable[[Expression], Expression]:
+    """A smooth function; `known` are an argument and its exact value there."""
+
+    def applied(e: Expression) -> Expression:
+        return known[1] if known and e is known[0] else _node(op, (e,))
+
+    return applied
 
 
-def cos(e: Expression) -> Expression:
-    """Cosine."""
-    return ONE if e is ZERO else _node("cos", (e,))
-
-
-def tan(e: Expression) -> Expression:
-    """Tangent."""
-    return ZERO if e is ZERO else _node("tan", (e,))
-
-
-def exp(e: Expression) -> Expression:
-    """Exponential."""
-    return ONE if e is ZERO else _node("exp", (e,))
-
-
-def log(e: Expression) -> Expression:
-    """Natural logarithm."""
-    return ZERO if e is ONE else _node("log", (e,))
-
-
-def asin(e: Expression) -> Expression:
-    """Inverse sine, in (-pi/2, pi/2)."""
-    return ZERO if e is ZERO else _node("asin", (e,))
-
-
-def acos(e: Expression) -> Expression:
-    """Inverse cosine, in (0, pi)."""
-    return _node("acos", (e,))
-
-
-def atan(e: Expression) -> Expression:
-    """Inverse tangent, in (-pi/2, pi/2)."""
-    return ZERO if e is ZERO else _node("atan", (e,))
-
-
-def sinh(e: Expression) -> Expression:
-    """Hyperbolic sine."""
-    return ZERO if e is ZERO else _node("sinh", (e,))
-
-
-def cosh(e: Expression) -> Expression:
-    """Hyperbolic cosine."""
-    return ONE if e is ZERO else _node("cosh", (e,))
-
-
-def tanh(e: Expression) -> Expression:
-    """Hyperbolic tangent."""
-    return ZERO if e is ZERO else _node("tanh", (e,))
-
-
+sin: Final = _smooth("sin", ZERO, ZERO)
+cos: Final = _smooth("cos", ZERO, ONE)
+tan: Final = _smooth("tan", ZERO, ZERO)
+exp: Final = _smooth("exp", ZERO, ONE)
+log: Final = _smooth("log", ONE, ZERO)
+asin: Final = _smooth("asin", ZERO, ZERO)
+acos: Final = _smooth("acos")
+atan: Final = _smooth("atan", ZERO, ZERO)
+sinh: Final = _smooth("sinh", ZERO, ZERO)
+cosh: Final = _smooth("cosh", ZERO, ONE)
+tanh: Final = _smooth("tanh", ZERO, ZERO)
 FUNCTIONS: Final[Mapping[str, Callable[[Expression], Expression]]] = {
-    "sin": sin,
-    "cos": cos,
-    "tan": tan,
-    "asin": asin,
-    "acos": acos,
-    "atan": atan,
-    "sinh": sinh,
-    "cosh": cosh,
-    "tanh": tanh,
-    "exp": exp,
-    "log": log,
-    "sqrt": sqrt,
-}
-"""The smooth functions of one argument, by name."""
+    "sin": sin, "cos": cos, "tan": tan, "asin": asin, "acos": acos, "atan": atan, "sinh": sinh,
+    "cosh": cosh, "tanh": tanh, "exp": exp, "log": log, "sqrt": sqrt,
+}  # fmt: skip
+"""The smooth functions of one argument, by name; asin in (-pi/2, pi/2), acos in (0, pi), atan in (-pi/2, pi/2)."""
 
 
 def table(lookup: Lookup, e: Expression) -> Expression:

@@ -10,6 +10,7 @@ from tubecert.expression.graph import ONE, ZERO, Expression, constant
 
 Matrix = tuple[tuple[Expression, ...], ...]
 Rows = Sequence[Sequence[Expression]]
+Rationals = Sequence[Sequence[Fraction]]
 
 
 def matrix(rows: Rows) -> Matrix:
@@ -80,8 +81,7 @@ def determinant(a: Rows, most: int | None = None) -> Expression:
 
     A dense one of n rows takes n 2**(n - 1) products; beyond `most` of them `TooLargeError` is raised.
     """
-    expansion = _Expansion(a, most)
-    return expansion.minor(0, tuple(range(len(a))))
+    return _Expansion(a, most).minor(0, tuple(range(len(a))))
 
 
 class _Expansion:
@@ -103,53 +103,34 @@ class _Expansion:
     def _expanded(self, first: int, columns: tuple[int, ...]) -> Expression:
         rows = [[row[j] for j in columns] for row in self._rows[first:]]
         if len(columns) > 2 and all(e.is_constant for row in rows for e in row):
-            return constant(_rational_determinant([[e.fraction for e in row] for row in rows]))
+            return constant(_rational([[e.fraction for e in row] for row in rows]))
         total = ZERO
         for k, entry in enumerate(rows[0]):
             if entry is not ZERO:
-                self._spend()
+                self._products += 1
+                if self._most is not None and self._products > self._most:
+                    raise TooLargeError(f"a determinant has more than {self._most} products")
                 total = total + (-1) ** k * entry * self.minor(first + 1, (*columns[:k], *columns[k + 1 :]))
         return total
 
-    def _spend(self) -> None:
-        self._products += 1
-        if self._most is not None and self._products > self._most:
-            raise TooLargeError(f"a determinant has more than {self._most} products")
 
+def _rational(rows: Rationals) -> Fraction:
+    from flint import fmpq, fmpq_mat
 
-def _rational_determinant(rows: list[list[Fraction]]) -> Fraction:
-    """The determinant by elimination."""
-    total = Fraction(1)
-    for j in range(len(rows)):
-        chosen = next((i for i in range(j, len(rows)) if rows[i][j] != 0), None)
-        if chosen is None:
-            return Fraction(0)
-        if chosen != j:
-            rows[j], rows[chosen] = rows[chosen], rows[j]
-            total = -total
-        total *= rows[j][j]
-        for row in rows[j + 1 :]:
-            factor = row[j] / rows[j][j]
-            row[j:] = [x - factor * y for x, y in zip(row[j:], rows[j][j:], strict=True)]
-    return total
+    found = fmpq_mat([[fmpq(q.numerator, q.denominator) for q in row] for row in rows]).det()
+    return Fraction(int(found.p), int(found.q))
 
 
 def adjugate(a: Rows) -> Matrix:
     """The matrix with a adj(a) = det(a) I."""
-    n = len(a)
-    return matrix(
-        [
-            [
-                (-1) ** (i + j)
-                * determinant([[*row[:i], *row[i + 1 :]] for k, row in enumerate(a) if k != j])
-                for j in range(n)
-            ]
-            for i in range(n)
-        ]
-    )
+
+    def cofactor(i: int, j: int) -> Expression:
+        return (-1) ** (i + j) * determinant([[*row[:i], *row[i + 1 :]] for k, row in enumerate(a) if k != j])
+
+    return matrix([[cofactor(i, j) for j in range(len(a))] for i in range(len(a))])
 
 
-def null_space(a: Sequence[Sequence[Fraction]]) -> list[list[Fraction]]:
+def null_space(a: Rationals) -> list[list[Fraction]]:
     """A basis of {v : a v = 0} over the rationals, as rows."""
     rows = [list(row) for row in a]
     width = len(rows[0])
@@ -175,6 +156,6 @@ def null_space(a: Sequence[Sequence[Fraction]]) -> list[list[Fraction]]:
     return basis
 
 
-def constants(rows: Sequence[Sequence[Fraction]]) -> Matrix:
+def constants(rows: Rationals) -> Matrix:
     """A rational matrix as expressions."""
     return matrix([[constant(x) for x in row] for row in rows])

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
 from typing import Final, Literal
 
 from tubecert.expression import graph
+from tubecert.expression.balls import BITS, middle, values
 from tubecert.expression.graph import Expression, topological
 from tubecert.expression.measures import HAS_NONE, UNITS, instead_of
 from tubecert.expression.parse import Parsed, parse
@@ -33,16 +33,7 @@ _ONE_FACTOR = re.compile(
     r"\s*[-+]?\s*(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[A-Za-z]\w*|\([^()]*\))"
     r"(?:\s*[*/]\s*(?:[0-9.]+|[A-Za-z]\w*))*\s*"
 )
-_PI: Final = Fraction(3141592653589793238462643383279502884197169399375105820974944592307816406286, 10**75)
-_ULP: Final = Fraction(1, 10**75)  # pi lies between _PI and _PI + _ULP
-
-
-@dataclass(frozen=True, slots=True)
-class _Range:
-    """Rational bounds."""
-
-    lo: Fraction
-    hi: Fraction
+_OF_PI: Final = frozenset({"const", "pi", "add", "mul", "div", "pow"})
 
 
 def parse_number(
@@ -53,7 +44,7 @@ def parse_number(
     With pi it is rounded to `DIGITS` digits, to that side. Raises `ExpressionError`.
     """
     value = parse_constant(text, symbols)
-    return value.fraction if value.is_constant else _rounded(_range(value), side)
+    return value.fraction if value.is_constant else _rounded(*_ends(value), side)
 
 
 def parse_constant(text: str, symbols: Mapping[str, Fraction | Expression] | None = None) -> Expression:
@@ -65,11 +56,10 @@ def parse_constant(text: str, symbols: Mapping[str, Fraction | Expression] | Non
     found = parsed.expression * factor
     try:
         for owed in parsed.obligations:
-            if (known_range := _range(owed.argument)).lo <= 0 and (
-                owed.kind == "positive" or known_range.hi >= 0
-            ):
+            low, high = _ends(owed.argument)
+            if low <= 0 and (owed.kind == "positive" or high >= 0):
                 raise ZeroDivisionError
-        _range(found)
+        _ends(found)
     except (ValueError, ZeroDivisionError):
         raise ExpressionError(
             f"{word[:60]} is not a rational number",
@@ -137,45 +127,19 @@ def _in_degrees(text: str, symbols: Mapping[str, Expression]) -> tuple[Parsed, E
         raise
 
 
-def _range(e: Expression) -> _Range:
+def _ends(e: Expression) -> tuple[Fraction, Fraction]:
     """An enclosure of a number made of rationals and pi; raises `ValueError` for another one."""
-    value: dict[Expression, _Range] = {}
-    for node in topological([e]):
-        args = [value[arg] for arg in node.args]
-        match node.op:
-            case "const":
-                value[node] = _Range(node.fraction, node.fraction)
-            case "pi":
-                value[node] = _Range(_PI, _PI + _ULP)
-            case "add":
-                value[node] = _Range(args[0].lo + args[1].lo, args[0].hi + args[1].hi)
-            case "mul":
-                value[node] = _times(args[0], args[1])
-            case "div":
-                value[node] = _times(args[0], _inverse(args[1]))
-            case "pow":
-                value[node] = _power(args[0], int(str(node.value)))
-            case _:
-                raise ValueError(node.op)
-    return value[e]
+    if e.is_constant:
+        return e.fraction, e.fraction
+    if any(node.op not in _OF_PI for node in topological([e])):
+        raise ValueError("made of more than pi")
+    from flint import ctx
 
-
-def _times(a: _Range, b: _Range) -> _Range:
-    corners = [p * q for p in (a.lo, a.hi) for q in (b.lo, b.hi)]
-    return _Range(min(corners), max(corners))
-
-
-def _inverse(a: _Range) -> _Range:
-    if a.lo <= 0 <= a.hi:
+    with ctx.workprec(BITS):
+        found = values([e], {})
+    if found is None:
         raise ZeroDivisionError
-    return _Range(1 / a.hi, 1 / a.lo)
-
-
-def _power(a: _Range, n: int) -> _Range:
-    base, result = _inverse(a) if n < 0 else a, _Range(Fraction(1), Fraction(1))
-    for _ in range(abs(n)):
-        result = _times(result, base)
-    return result
+    return middle(found[0].lower()), middle(found[0].upper())
 
 
 def root_above(square: Fraction) -> Fraction:
@@ -188,12 +152,12 @@ def root_above(square: Fraction) -> Fraction:
     return Fraction(isqrt(scaled.numerator // scaled.denominator) + 1) / Fraction(10) ** places
 
 
-def _rounded(value: _Range, side: Side) -> Fraction:
-    """A decimal of `DIGITS` digits at or next to every number of the range."""
-    size = max(abs(value.lo), abs(value.hi))
+def _rounded(low: Fraction, high: Fraction, side: Side) -> Fraction:
+    """A decimal of `DIGITS` digits at or next to every number of a range."""
+    size = max(abs(low), abs(high))
     bits = size.numerator.bit_length() - size.denominator.bit_length()
     places = DIGITS - bits * 30103 // 100000  # log10(2)
     grid = Fraction(10) ** -places
     if side == "nearest":
-        return round((value.lo + value.hi) / 2 / grid) * grid
-    return value.lo // grid * grid if side == "below" else -(-value.hi // grid) * grid
+        return round((low + high) / 2 / grid) * grid
+    return low // grid * grid if side == "below" else -(-high // grid) * grid
