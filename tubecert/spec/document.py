@@ -1,15 +1,17 @@
 """YAML events -> a tree of nodes that know where they stand.
 
 Nothing is resolved: a scalar stays the text that was written (PyYAML reads `1e-3` as text, `NO` as false and
-`1:30` as 90). Aliases, tags and further documents are findings. Events come one by one and the tree grows on
-an explicit stack, so that depth is checked before it can hurt.
+`1:30` as 90). Aliases, tags and further documents are findings. Events come one by one, so that depth is checked
+before it can hurt.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
-from typing import Any, Final
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
+from typing import Any, Final, Literal
 
 import yaml
 
@@ -17,58 +19,41 @@ from tubecert.findings import Finding
 from tubecert.spec import codes
 from tubecert.spec.source import Mark, Source
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Placed:
-    """Where a node stands: `start` in the text `source`."""
-
-    start: Mark
-    source: Source = field(repr=False)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scalar(Placed):
-    """Text as written; `style` is empty for plain text, else the quote or block indicator."""
-
-    end: Mark
-    text: str
-    style: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ListNode(Placed):
-    """A list."""
-
-    items: tuple[Node, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MappingNode(Placed):
-    """A mapping, with its keys in the order of the file."""
-
-    pairs: tuple[tuple[Scalar, Node], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BrokenNode(Placed):
-    """Stands where something was refused (and reported)."""
-
-
 MAX_NESTING: Final = 50
 
 _PLAIN_TAGS = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("str", "int", "float", "seq", "map"))
 
-Node = Scalar | ListNode | MappingNode | BrokenNode
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """What stands at `start` in the text `source`; what a node of its kind does not have is empty.
 
-@dataclass(slots=True, kw_only=True)
-class _Open:
-    """A collection that is still being read."""
+    A scalar is its `text` as written, with `style` empty for plain text, else the quote or block indicator; a list has
+    `items`, a mapping `pairs` in the order of the file; a broken one stands where something was refused (and reported).
+    """
 
+    kind: Literal["scalar", "list", "mapping", "broken"]
     start: Mark
-    mapping: bool
-    broken: bool
-    children: list[Node] = field(default_factory=list)
+    source: Source = field(repr=False)
+    end: Mark | None = None
+    text: str = ""
+    style: str = ""
+    items: tuple[Node, ...] = ()
+    pairs: tuple[tuple[Node, Node], ...] = ()
+
+    @property
+    def is_row(self) -> bool:
+        """Whether this is a list of scalars."""
+        return self.kind == "list" and len(self.texts) == len(self.items)
+
+    @property
+    def texts(self) -> list[str]:
+        """The texts of the scalars of a list, without blanks around them."""
+        return [node.text.strip() for node in self.items if node.kind == "scalar"]
+
+
+class _NestedError(Exception):
+    """Nodes within nodes beyond `MAX_NESTING`."""
 
 
 def compose(source: Source, language: str = "YAML") -> tuple[Node | None, list[Finding]]:
@@ -77,55 +62,72 @@ def compose(source: Source, language: str = "YAML") -> tuple[Node | None, list[F
     `language` is what findings call it (JSON is YAML).
     """
     composer = _Composer(source)
-    # The C parser is the same grammar, faster; where PyYAML was built without it the other one serves.
-    loader: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
-        for event in yaml.parse(source.text, Loader=loader):
-            composer.take(event, _mark(event.start_mark))
-            if len(composer.stack) > MAX_NESTING:
-                message = f"the text is nested more than {MAX_NESTING} deep"
-                composer.report(codes.LIMIT, _mark(event.start_mark), message)
-                return None, composer.findings
+        return composer.document(), composer.findings
     except yaml.YAMLError as error:
         composer.findings.append(_syntax(source, error, language))
-        return None, composer.findings
-    return composer.root, composer.findings
+    except _NestedError:
+        pass
+    return None, composer.findings
 
 
 class _Composer:
-    """Builds the tree from events."""
+    """Builds the tree from events, each node when its event comes."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.findings: list[Finding] = []
-        self.root: Node | None = None
-        self.documents = 0
-        self.stack: list[_Open] = []
         self.refused: set[str] = set()
+        # The C parser is the same grammar, faster; where PyYAML was built without it the other one serves.
+        self.events = yaml.parse(source.text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
 
     def report(self, code: str, mark: Mark, message: str, help: str = "") -> None:
         """Adds a finding."""
         location = self.source.location(mark)
         self.findings.append(Finding(code=code, message=message, location=location, help=help))
 
-    def take(self, event: yaml.Event, start: Mark) -> None:
-        """Takes one event."""
-        if isinstance(event, yaml.DocumentStartEvent):
-            self.documents += 1
-            if self.documents == 2:
-                self.report(codes.YAML_FEATURE, start, "a file holds one document", "remove what follows ---")
-        elif isinstance(event, yaml.AliasEvent):
+    def document(self) -> Node | None:
+        """The first document; raises `yaml.YAMLError` and `_NestedError`."""
+        found: list[Node] = []
+        documents = 0
+        for event in self.events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                documents += 1
+                if documents == 2:
+                    mark, help = _mark(event.start_mark), "remove what follows ---"
+                    self.report(codes.YAML_FEATURE, mark, "a file holds one document", help)
+            elif isinstance(event, yaml.NodeEvent):
+                found.append(self._node(event, depth=1))
+        return found[0] if found else None
+
+    def _node(self, event: yaml.NodeEvent, depth: int) -> Node:
+        """The node that begins with an event, with all that is in it."""
+        start = _mark(event.start_mark)
+        broken = Node(kind="broken", start=start, source=self.source)
+        if isinstance(event, yaml.AliasEvent):
             self._refuse("aliases", start, "quote text that begins with *, or repeat what it stands for")
-            self._place(BrokenNode(start=start, source=self.source))
-        elif isinstance(event, yaml.ScalarEvent):
-            broken, style, end = self._is_refused(event, start), event.style or "", _mark(event.end_mark)
-            scalar = Scalar(start=start, source=self.source, end=end, text=event.value, style=style)
-            self._place(BrokenNode(start=start, source=self.source) if broken else scalar)
-        elif isinstance(event, yaml.NodeEvent):
-            mapping = isinstance(event, yaml.MappingStartEvent)
-            self.stack.append(_Open(start=start, mapping=mapping, broken=self._is_refused(event, start)))
-        elif isinstance(event, yaml.CollectionEndEvent):
-            self._place(self._close(self.stack.pop()))
+            return broken
+        refused = self._is_refused(event, start)
+        if isinstance(event, yaml.ScalarEvent):
+            style, end = event.style or "", _mark(event.end_mark)
+            own = replace(broken, kind="scalar", end=end, text=event.value, style=style)
+            return broken if refused else own
+        if depth > MAX_NESTING:
+            self.report(codes.LIMIT, start, f"the text is nested more than {MAX_NESTING} deep")
+            raise _NestedError
+        inner: Iterator[Any] = takewhile(
+            lambda own: not isinstance(own, yaml.CollectionEndEvent), self.events
+        )
+        below = tuple(self._node(each, depth + 1) for each in inner)
+        if refused:
+            return broken
+        if isinstance(event, yaml.SequenceStartEvent):
+            return replace(broken, kind="list", items=below)
+        pairs = tuple(zip(below[::2], below[1::2], strict=True))
+        for key, _ in pairs:
+            if key.kind in ("list", "mapping"):
+                self.report(codes.WRONG_TYPE, key.start, "a key must be a plain word")
+        return replace(broken, kind="mapping", pairs=tuple(p for p in pairs if p[0].kind == "scalar"))
 
     def _is_refused(self, event: yaml.NodeEvent, start: Mark) -> bool:
         """Reports anchors and tags; returns whether a tag changes what the node means."""
@@ -141,25 +143,6 @@ class _Composer:
         if what not in self.refused:
             self.report(codes.YAML_FEATURE, start, f"{what} are not allowed", help)
         self.refused.add(what)
-
-    def _place(self, node: Node) -> None:
-        if self.stack:
-            self.stack[-1].children.append(node)
-        elif self.documents == 1:
-            self.root = node
-
-    def _close(self, open_: _Open) -> Node:
-        if open_.broken:
-            return BrokenNode(start=open_.start, source=self.source)
-        if not open_.mapping:
-            return ListNode(start=open_.start, source=self.source, items=tuple(open_.children))
-        pairs: list[tuple[Scalar, Node]] = []
-        for key, value in zip(open_.children[::2], open_.children[1::2], strict=True):
-            if isinstance(key, Scalar):
-                pairs.append((key, value))
-            elif not isinstance(key, BrokenNode):
-                self.report(codes.WRONG_TYPE, key.start, "a key must be a plain word")
-        return MappingNode(start=open_.start, source=self.source, pairs=tuple(pairs))
 
 
 def _mark(mark: Any) -> Mark:  # the two parsers have marks of different types
@@ -218,7 +201,7 @@ def _remedy(problem: str, line: str) -> str:
     return "check indentation, brackets and quotes near this place"
 
 
-def place_in(scalar: Scalar, offset: int) -> Mark:
+def place_in(scalar: Node, offset: int) -> Mark:
     """Where the character at `offset` of the scalar's text stands in the file.
 
     Folding and `''` are followed by matching characters; a text with backslash escapes is located at its
@@ -226,7 +209,7 @@ def place_in(scalar: Scalar, offset: int) -> Mark:
     """
     source = scalar.source
     raw_start = source.index(scalar.start)
-    raw = source.text[raw_start : source.index(scalar.end)]
+    raw = source.text[raw_start : source.index(scalar.end or scalar.start)]
     if scalar.style == '"' and "\\" in raw:
         return scalar.start
     position = raw.find("\n") + 1 if scalar.style in ("|", ">") else 1 if scalar.style else 0

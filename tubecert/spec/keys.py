@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 from tubecert.expression import Side, constant, full_text, number_text, to_text
 from tubecert.spec import codes
-from tubecert.spec.document import Scalar
 from tubecert.spec.reader import Field, whole
 from tubecert.spec.values import Matrix, Term, TermMatrix, Vector
 
@@ -313,7 +312,7 @@ def form(schema: Schema, write: Callable[[Any, Any], Any] = _as_it_is) -> Kind:
 
 def says(field: Field | None, text: str) -> bool:
     """Whether a word stands there."""
-    return field is not None and isinstance(field.node, Scalar) and field.node.text == text
+    return field is not None and field.node.kind == "scalar" and field.node.text == text
 
 
 def constant_term(field: Field, value: Fraction) -> Term:

@@ -11,7 +11,7 @@ from tubecert.expression import free_symbols
 from tubecert.expression.waves import frequencies
 from tubecert.findings import Finding, Location, capped
 from tubecert.spec import codes, keys
-from tubecert.spec.document import MappingNode, Scalar, compose
+from tubecert.spec.document import compose
 from tubecert.spec.keys import AUTO, Kind, entry, form, section
 from tubecert.spec.machine import (
     CONTROLLER,
@@ -193,7 +193,7 @@ def _ordered(findings: list[Finding]) -> list[Finding]:
 
 
 def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None:
-    if isinstance(root.node, Scalar) and not root.node.text:
+    if root.node.kind == "scalar" and not root.node.text:
         return root.fail(codes.MISSING_KEY, "the file is empty", f"begin with tubecert: {VERSION}")
     if is_of_another_kind(root, _OTHERS):
         return None
@@ -244,10 +244,9 @@ def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None
 
 def _asks_about_metric(root: Field) -> bool:
     """Whether there is a metric, given and not asked for, and nothing of a plan, a loop or a tube."""
-    found = {key.text: node for key, node in root.node.pairs} if isinstance(root.node, MappingNode) else {}
-    own = found.get("metric")
-    wanted = isinstance(own, MappingNode) and any(key.text == "synthesise" for key, _ in own.pairs)
-    return own is not None and not wanted and not found.keys() & (FILE.keys.keys() - {*_SYSTEM, *_METRIC})
+    found = {key.text: node for key, node in root.node.pairs}
+    wanted = "metric" not in found or any(key.text == "synthesise" for key, _ in found["metric"].pairs)
+    return not wanted and not found.keys() & (FILE.keys.keys() - {*_SYSTEM, *_METRIC})
 
 
 def _of_metric_alone(file: str, place: Location | None) -> Finding:

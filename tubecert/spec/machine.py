@@ -14,7 +14,6 @@ from typing import Any, ClassVar, Final, Literal
 from tubecert.digits import near
 from tubecert.expression import number_text
 from tubecert.spec import codes, keys
-from tubecert.spec.document import ListNode, MappingNode, Scalar
 from tubecert.spec.instead import same_as
 from tubecert.spec.keys import CHOSEN, NUMBER, Kind, ends, entry, key, named, number, says, section, word
 from tubecert.spec.names import Names
@@ -57,7 +56,7 @@ def check_machine(entries: Mapping[str, Field]) -> None:
         told = [(entries.get("controller"), _OF_A_COMPUTER)]
         told += [(plan and plan.get(key), _OF_A_COMPUTER) for key in ("afterwards", "input_rate")]
         bound = wind and wind.get("bound")
-        told += [(bound, _ONE_NUMBER)] if bound and isinstance(bound.node, ListNode) else []
+        told += [(bound, _ONE_NUMBER)] if bound and bound.node.kind == "list" else []
         beside = "without"
     for field, help in told:
         if field is not None:
@@ -68,7 +67,7 @@ def _delay(field: Field, names: Names) -> Fraction | object | None:
     """In s; what is told in samples is refused, but for one sample, and a parameter may have that name."""
     if says(field, ONE_SAMPLE):
         return CHOSEN
-    text = field.node.text if isinstance(field.node, Scalar) else ""
+    text = field.node.text
     if not any("sample" in each and each not in names.values for each in re.findall(r"\w+", text)):
         return field.number(names.values, least=0, side="above")
     message = f"{field.path} is {text[:40]!r}, not a time in seconds"
@@ -82,7 +81,7 @@ _BY_STATE: Final = named("states", keys.SIZE)
 
 def _noise(field: Field, names: Names) -> Fraction | Vector | None:
     """|n|, or |n_i| by state, 0 for those that are not named."""
-    if not isinstance(field.node, MappingNode):
+    if field.node.kind != "mapping":
         return field.number(names.values, least=0, side="above")
     sizes = _BY_STATE.read(field, names)
     return None if sizes is None else tuple(dict(sizes).get(name, Fraction(0)) for name in names.states)
@@ -188,5 +187,4 @@ def _sample_time(field: Field, entries: Mapping[str, Field], names: Names) -> Fr
 
 def _is_meant(field: Field) -> bool:
     """Whether an unknown key stands for the rate or the sample time."""
-    pairs = field.node.pairs if isinstance(field.node, MappingNode) else ()
-    return any(same_as(key.text, ("rate", "sample_time")) for key, _ in pairs)
+    return any(same_as(key.text, ("rate", "sample_time")) for key, _ in field.node.pairs)

@@ -10,7 +10,6 @@ from typing import Final, Literal
 from tubecert.expression import suggestion, to_text
 from tubecert.spec import codes, keys
 from tubecert.spec.algebra import asymmetric_entry
-from tubecert.spec.document import MappingNode
 from tubecert.spec.keys import AUTO, NAME, Kind, Section, entry, key, number, or_auto, section, several, word
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
@@ -224,7 +223,7 @@ WANTED: Final = Section(
 def read_metric(field: Field, names: Names) -> Metric | Synthesis | None:
     """The dual metric with its rate, and declared bounds of the metric, or what is asked for in its place."""
     before = len(field.reader.findings)
-    there = [key.text for key, _ in field.pairs() or ()] if isinstance(field.node, MappingNode) else []
+    there = [key.text for key, _ in field.pairs() or ()] if field.node.kind == "mapping" else []
     if there == ["rate"]:
         help = "add dual_metric: ..., or have one of this rate found: metric: {synthesise: {rate: ...}}"
         return field.fail(codes.MISSING_KEY, f"{field.path} lacks dual_metric", f"{help} (tubecert synth)")

@@ -28,7 +28,7 @@ from tubecert.expression import (
     topological,
 )
 from tubecert.spec import codes
-from tubecert.spec.document import ListNode, Scalar
+from tubecert.spec.document import Node
 from tubecert.spec.lookup import read_lookup
 from tubecert.spec.reader import Field
 from tubecert.spec.scope import Scope
@@ -183,11 +183,7 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
 
 
 def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[str, ...] | None:
-    if (
-        field is not None
-        and isinstance(field.node, ListNode)
-        and not 1 <= len(field.node.items) <= MAX_STATES
-    ):
+    if field is not None and field.node.kind == "list" and not 1 <= len(field.node.items) <= MAX_STATES:
         count = len(field.node.items)
         code = codes.LIMIT if count else codes.WRONG_SHAPE
         help = "" if count or what == "state" else _NO_INPUT
@@ -195,9 +191,8 @@ def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[s
     items = field.items(None, f"{what} names") if field else None
     if items is None:
         return None
-    if len(items) == 1 and isinstance(items[0].node, ListNode):
-        inner = [node.text for node in items[0].node.items if isinstance(node, Scalar)]
-        help = f"write [{', '.join(inner)[:60]}]: one pair of brackets is too many"
+    if len(items) == 1 and items[0].node.kind == "list":
+        help = f"write [{', '.join(items[0].node.texts)[:60]}]: one pair of brackets is too many"
         message = f"{items[0].path} must be the name of {_with_article(what)}, not a list"
         return items[0].fail(codes.WRONG_TYPE, message, help)
     names = [new_name(item.text(f"the name of {_with_article(what)}"), item, what, taken) for item in items]
@@ -256,7 +251,7 @@ def _read_parameters(
     found = list(new_names(field, "of names to numbers", "parameter", taken))
     for i, (name, entry, _) in enumerate(found):
         later = [other for _, _, other in found[i + 1 :]]
-        if isinstance(entry.node, ListNode):
+        if entry.node.kind == "list":
             ends = entry.ends(
                 values, counted=_KNOWN, help="write [lower, upper], or one number if it is known"
             )
@@ -274,7 +269,7 @@ _RANGE = re.compile(r"([0-9.eE]+) *(?:-|\.\.+|\u2013|to) *([0-9.eE]+)|.*(?:\+-|\
 
 def _is_range(field: Field) -> bool:
     """Reports a parameter whose text reads as a range or a tolerance: it would be a difference or a sum."""
-    text = field.node.text.strip() if isinstance(field.node, Scalar) else ""
+    text = field.node.text.strip()
     found = _RANGE.fullmatch(text)
     if found is None or (found[1] and not _rises(found[1], found[2])):
         return False
@@ -286,7 +281,7 @@ def _is_range(field: Field) -> bool:
 
 def _is_early(field: Field, later: Collection[str]) -> bool:
     """Reports a parameter that uses one from further down."""
-    text = field.node.text if isinstance(field.node, Scalar) else ""
+    text = field.node.text
     early = next((word for word in re.findall(r"[A-Za-z]\w*", text) if word in later), None)
     if early is not None:
         message = f"{early} is defined further down; a parameter may use those above it"
@@ -338,7 +333,7 @@ def new_names(
         yield new_name(key.text, key_field(field, key), what, taken), field.child(key, node), key.text
 
 
-def key_field(field: Field, key: Scalar) -> Field:
+def key_field(field: Field, key: Node) -> Field:
     """A key, to report about it."""
     return Field(reader=field.reader, path=f"{field.path}.{key.text[:60]}", node=key)
 
@@ -389,8 +384,7 @@ def rates_of_states(f: Field | None, states: Sequence[str]) -> dict[str, str]:
 
     f is taken as it is written, read or not.
     """
-    nodes = f.node.items if f is not None and isinstance(f.node, ListNode) else ()
-    texts = [node.text.strip() if isinstance(node, Scalar) else "" for node in nodes]
+    texts = [node.text.strip() for node in f.node.items] if f else []
     texts = texts if len(texts) == len(states) else [""] * len(states)
     names = {rate for state in states for rate in rates_of(state)} - set(states)
     told: dict[str, str] = {}

@@ -15,7 +15,7 @@ from tubecert.errors import SpecError
 from tubecert.expression import suggestion
 from tubecert.findings import Finding, Location, NamedPlace
 from tubecert.spec import codes
-from tubecert.spec.document import ListNode, MappingNode, Node, Scalar, compose
+from tubecert.spec.document import Node, compose
 from tubecert.spec.source import Mark, Source, check_limits
 
 OPTION: Final = "--set"
@@ -93,25 +93,22 @@ class _Put:
         part, before = self.parts[k], self.setting.path[: self.parts[k].start()].rstrip(".")
         before = before or "the specification"
         if part[1] is None:
-            items = root.items if isinstance(root, ListNode) else ()
-            index = int(part[2])
-            if isinstance(root, ListNode) and index < len(items):
-                changed = [
-                    self.within(own, k + 1, names) if i == index else own for i, own in enumerate(items)
-                ]
-                return replace(root, items=tuple(changed))
-            have = f"has {len(items)} entries" if isinstance(root, ListNode) else "is no list"
+            items, index = root.items, int(part[2])
+            if index < len(items):
+                within = self.within(items[index], k + 1, names)
+                return replace(root, items=(*items[:index], within, *items[index + 1 :]))
+            have = f"has {len(items)} entries" if root.kind == "list" else "is no list"
             help = f"they are numbered from [0] to [{len(items) - 1}]" if items else ""
             return self._unchanged(root, part, f"{before} {have}: there is no [{index}]", help)
-        if isinstance(root, Scalar) and not root.text and not root.style:
-            root = MappingNode(start=root.start, source=root.source, pairs=())
-        if isinstance(root, MappingNode):
+        if root.kind == "scalar" and not root.text and not root.style:
+            root = replace(root, kind="mapping")
+        if root.kind == "mapping":
             return self._within(root, k, before, names)
-        found = "a list" if isinstance(root, ListNode) else "a value"
-        help = "number the entries of a list from 0: [0]" if isinstance(root, ListNode) else ""
+        found = "a list" if root.kind == "list" else "a value"
+        help = "number the entries of a list from 0: [0]" if root.kind == "list" else ""
         return self._unchanged(root, part, f"{before} is {found}: it has no keys", help)
 
-    def _within(self, node: MappingNode, k: int, before: str, names: Mapping[str, str]) -> Node:
+    def _within(self, node: Node, k: int, before: str, names: Mapping[str, str]) -> Node:
         """The same of a mapping: a key that is not there yet is added, but no name of the user's."""
         part, known = self.parts[k], [own.text for own, _ in node.pairs]
         key = part[1]
@@ -133,15 +130,15 @@ class _Put:
             message = f"{self.setting.path[: part.end()]} is not in the file: it has no entries"
             return self._unchanged(node, part, message)
         start, end = Mark(line=0, column=part.start()), Mark(line=0, column=part.end())
-        own = Scalar(start=start, end=end, text=key, source=self.source)
-        below = self.within(MappingNode(start=start, pairs=(), source=self.source), k + 1, names)
+        own = Node(kind="scalar", start=start, end=end, text=key, source=self.source)
+        below = self.within(Node(kind="mapping", start=start, source=self.source), k + 1, names)
         return replace(node, pairs=(*node.pairs, (own, below)))
 
     def _value(self) -> Node:
         """The value: a scalar as it is written, or a list or mapping in brackets."""
         text, column = self.setting.text, len(self.setting.path) + 1
         start, end = Mark(line=0, column=column), Mark(line=0, column=column + len(text))
-        plain = Scalar(start=start, end=end, text=text, source=self.source)
+        plain = Node(kind="scalar", start=start, end=end, text=text, source=self.source)
         if text[0] not in "[{":
             return plain
         node, findings = compose(replace(self.source, text=" " * column + text))
@@ -156,15 +153,10 @@ class _Put:
 
 def _named(root: Node) -> dict[str, str]:
     """The user's own names in a file that a path may have been meant for, with where they stand."""
-    pairs = root.pairs if isinstance(root, MappingNode) else ()
-    top = {key.text for key, _ in pairs}
-    system = next((value for key, value in pairs if key.text == "system"), None)
-    found: dict[str, str] = {}
-    for section, value in system.pairs if isinstance(system, MappingNode) else ():
-        path = f"system.{section.text}"
-        if path in _MEANT and isinstance(value, MappingNode):
-            found |= {key.text: path for key, _ in value.pairs if key.text not in top}
-    return found
+    top = {key.text: value for key, value in root.pairs}
+    sections = {f"system.{key.text}": own for key, own in top["system"].pairs} if "system" in top else {}
+    named = [(key.text, path) for path, own in sections.items() if path in _MEANT for key, _ in own.pairs]
+    return {name: path for name, path in named if name not in top}
 
 
 def put(node: Node | None, settings: Sequence[Setting]) -> tuple[Node | None, list[Finding]]:

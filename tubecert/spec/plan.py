@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Final, Literal, get_args
 from tubecert.expression import ExpressionError, constant, free_symbols, parse_number, to_text
 from tubecert.spec import codes, keys
 from tubecert.spec.algebra import is_positive_definite, is_positive_semidefinite
-from tubecert.spec.document import MappingNode, Scalar
 from tubecert.spec.keys import SIZE, Kind, each, entry, expressions, form, key, number, numbers, section, word
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
@@ -29,7 +28,7 @@ _AFTERWARDS: Final = word(*get_args(Afterwards))
 
 def read_ends(field: Field, names: Names, *, point: bool = False) -> Ends | None:
     """A range, of a `point` also a number, one without width; with pi in it, the least one that contains it."""
-    if point and isinstance(field.node, Scalar):
+    if point and field.node.kind == "scalar":
         low = field.number(names.values, side="below")
         high = None if low is None else field.number(names.values, side="above")
         return None if low is None or high is None else (low, high)
@@ -41,7 +40,7 @@ def read_ends(field: Field, names: Names, *, point: bool = False) -> Ends | None
 
 def _of_one_number(field: Field, names: Names) -> str:
     """The two ways to write a number that stands where a range belongs; empty for anything else."""
-    text = field.node.text.strip() if isinstance(field.node, Scalar) else ""
+    text = field.node.text.strip()
     try:
         value = parse_number(text, names.values)
     except ExpressionError:
@@ -135,7 +134,7 @@ _RATES: Final = each("inputs", SIZE)
 
 def _input_rate(field: Field, names: Names) -> Vector | None:
     """|u*'| of every input, by one number or input by input."""
-    if isinstance(field.node, MappingNode):
+    if field.node.kind == "mapping":
         found: Vector | None = _RATES.read(field, names)
         return found
     rate = field.number(names.values, least=0, side="above")

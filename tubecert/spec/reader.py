@@ -26,7 +26,7 @@ from tubecert.expression import (
 )
 from tubecert.findings import MOST, Finding, Location
 from tubecert.spec import codes
-from tubecert.spec.document import BrokenNode, ListNode, MappingNode, Node, Scalar, place_in
+from tubecert.spec.document import Node, place_in
 from tubecert.spec.instead import example_of, glued, of_key, of_value, of_word
 from tubecert.spec.scope import MODERATE, Parameters, Scope, out_of_range
 from tubecert.spec.source import Mark, Source
@@ -67,19 +67,18 @@ class Field:
     reader: Reader = field(repr=False)
     path: str
     node: Node
-    key: Scalar | None = None  # the key whose value this is
+    key: Node | None = None  # the key whose value this is
 
     @property
     def location(self) -> Location:
         """Where the value begins."""
-        width = len(self.node.text) if isinstance(self.node, Scalar) else 1
-        return self.node.source.location(self.node.start, width)
+        return self.node.source.location(self.node.start, len(self.node.text))
 
     def fail(self, code: str, message: str, help: str = "") -> T | None:
         """Reports that this value will not do."""
         return self.reader.report(code, self.location, message, help)
 
-    def child(self, key: Scalar, node: Node) -> Field:
+    def child(self, key: Node, node: Node) -> Field:
         """The value of a key."""
         below = Field(reader=self.reader, path=self._name(key.text), node=node, key=key)
         self.reader.places[below.path] = below.location
@@ -87,8 +86,7 @@ class Field:
 
     def get(self, name: str) -> Field | None:
         """The value of a key, if this is a mapping that has it."""
-        pairs = self.node.pairs if isinstance(self.node, MappingNode) else ()
-        return next((self.child(key, node) for key, node in pairs if key.text == name), None)
+        return next((self.child(key, node) for key, node in self.node.pairs if key.text == name), None)
 
     def item(self, index: int, node: Node) -> Field:
         """An item of a list."""
@@ -128,11 +126,11 @@ class Field:
                 self._at(codes.MISSING_KEY, self.key, message, help)
         return fields
 
-    def pairs(self, purpose: str = "", shown: str = "NAME: ...") -> list[tuple[Scalar, Node]] | None:
+    def pairs(self, purpose: str = "", shown: str = "NAME: ...") -> list[tuple[Node, Node]] | None:
         """The keys and values of a mapping, without keys that occur twice."""
-        if not isinstance(self.node, MappingNode):
+        if self.node.kind != "mapping":
             return self._wrong_type(f"a mapping {purpose}".strip(), f"write {{{shown}}}")
-        seen: dict[str, Scalar] = {}
+        seen: dict[str, Node] = {}
         for key, _ in self.node.pairs:
             if key.text == "<<" and not key.style:
                 self._at(codes.YAML_FEATURE, key, "merge keys are not allowed", "write the keys out")
@@ -149,7 +147,7 @@ class Field:
 
     def items(self, count: int | None = None, what: str = "entries", help: str = "") -> list[Field] | None:
         """The items of a list; another number of them than `count` is a finding."""
-        if not isinstance(self.node, ListNode):
+        if self.node.kind != "list":
             return self._wrong_type(
                 f"a list of {what if count is None else _counted(count, what)}", help or self._listed(count)
             )
@@ -161,7 +159,7 @@ class Field:
 
     def text(self, what: str = "text") -> str | None:
         """The text of a scalar."""
-        if not isinstance(self.node, Scalar):
+        if self.node.kind != "scalar":
             return self._wrong_type(what)
         return self.node.text
 
@@ -176,7 +174,7 @@ class Field:
 
     def number(self, parameters: Parameters, *, side: Side = "nearest", **bounds: int) -> Fraction | None:
         """A rational number, `above`, at `least` and at `most` its bounds; what contains pi is rounded to a side."""
-        if not isinstance(self.node, Scalar):
+        if self.node.kind != "scalar":
             return self._wrong_type("a number", self._one_number())
         try:
             value = parse_number(self.node.text, parameters, side)
@@ -194,7 +192,7 @@ class Field:
     def constant(self, parameters: Parameters) -> Expression | None:
         """A number as it is, with pi if it contains that."""
         value = self.number(parameters)
-        if value is None or not isinstance(self.node, Scalar):
+        if value is None:
             return None
         exact = parse_constant(self.node.text, parameters)
         if longest_text(exact) > MAX_LENGTH:
@@ -227,26 +225,24 @@ class Field:
 
     def matrix(self, n: int, parameters: Parameters) -> Matrix | None:
         """A square matrix of numbers, or a number that stands for a multiple of the identity."""
-        if isinstance(self.node, Scalar):
+        if self.node.kind == "scalar":
             value = self.number(parameters)
             if value is None:
                 return None
             return tuple(tuple(value if i == j else Fraction(0) for j in range(n)) for i in range(n))
-        if self._nodes and all(isinstance(node, Scalar) for node in self._nodes):
-            return self.fail(
-                codes.WRONG_SHAPE, f"{self.path} must be a matrix, not a list", self._diagonal(n)
-            )
+        if self.node.is_row and self.node.items:
+            message = f"{self.path} must be a matrix, not a list"
+            return self.fail(codes.WRONG_SHAPE, message, self._diagonal(n))
         rows = self.items(n, "rows", f"write one number, or {n} rows of {n} numbers")
         return whole([row.numbers(n, parameters) for row in rows or []], n)
 
     def term(self, scope: Scope) -> Term | None:
         """An expression."""
-        if not isinstance(self.node, Scalar):
-            row = isinstance(self.node, ListNode) and all(isinstance(each, Scalar) for each in self._nodes)
-            help = (
-                "write a row of A x as one expression: 2*x1 - x2" if row else "put the expression in quotes"
+        if self.node.kind != "scalar":
+            row = "write a row of A x as one expression: 2*x1 - x2"
+            return self._wrong_type(
+                "an expression", row if self.node.is_row else "put the expression in quotes"
             )
-            return self._wrong_type("an expression", help)
         try:
             parsed = scope.parse(self.node.text)
         except ExpressionError as error:
@@ -264,7 +260,7 @@ class Field:
 
     def terms(self, count: int, scope: Scope, what: str = "expressions") -> tuple[Term, ...] | None:
         """A list of expressions; the ones that are there are read even if their number is wrong."""
-        if not isinstance(self.node, ListNode):
+        if self.node.kind != "list":
             return self._wrong_type(f"a list of {what}", self._listed(count))
         nodes = self.node.items[: 2 * count + 8]
         found = [self.item(i, node).term(scope) for i, node in enumerate(nodes)]
@@ -276,17 +272,17 @@ class Field:
         """A matrix of expressions, row by row."""
         row = f"[{', '.join(['...'] * columns)}]"
         shape = f"[{', '.join([row] * rows)}]" if rows * columns <= 9 else f"{rows} rows of {columns}"
-        if isinstance(self.node, ListNode) and all(isinstance(node, Scalar) for node in self.node.items):
+        if self.node.is_row:
             return self.fail(codes.WRONG_SHAPE, f"{self.path} must be a list of rows", f"write {shape}")
         help = f"write {shape}"
-        if rows != columns == len(self._nodes):
+        if rows != columns == len(self.node.items):
             help += "; these rows may be its columns"
         found = self.items(rows, "rows", help)
         return whole([row.terms(columns, scope) for row in found or []], rows)
 
     def inside(self, offset: int, width: int) -> Location:
         """The place of a part of a scalar's text."""
-        assert isinstance(self.node, Scalar)
+        assert self.node.kind == "scalar"
         return self.node.source.location(place_in(self.node, offset), width)
 
     # findings
@@ -296,7 +292,7 @@ class Field:
         code = ordinary if special == codes.EXPRESSION else special
         return self.reader.report(code, self.inside(error.offset, error.width), error.message, error.help)
 
-    def _at(self, code: str, key: Scalar, message: str, help: str = "") -> None:
+    def _at(self, code: str, key: Node, message: str, help: str = "") -> None:
         self.reader.report(code, key.source.location(key.start, len(key.text)), message, help)
 
     def _name(self, key: str) -> str:
@@ -304,9 +300,9 @@ class Field:
 
     def _listed(self, count: int | None) -> str:
         """How a value would be written as a list."""
-        if isinstance(self.node, MappingNode):
+        if self.node.kind == "mapping":
             return "write the values only, in brackets and in their order: [..., ...]"
-        text = self.node.text.strip() if isinstance(self.node, Scalar) else ""
+        text = self.node.text.strip()
         if text.startswith("(") and text.endswith(")"):
             text = text[1:-1].strip()
         if count == 2 and (size := re.fullmatch(r"(?:\+-|\+/-|±)\s*([0-9.]+)", text)):
@@ -322,14 +318,13 @@ class Field:
 
     def _one_number(self) -> str:
         """What to write for a range that is symmetric, or a list of one number."""
-        texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
-        if len(texts) == 1 or (len(texts) == 2 and texts[0] == f"-{texts[1]}"):
-            return f"write {texts[-1]}"
-        return ""
+        texts = self.node.texts
+        single = len(texts) == 1 or (len(texts) == 2 and texts[0] == f"-{texts[1]}")
+        return f"write {texts[-1]}" if single else ""
 
     def _diagonal(self, n: int) -> str:
         """What to write for a list that gives a matrix by its diagonal."""
-        texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
+        texts = self.node.texts
         if len(texts) != n or n > 4:
             return f"write one number for a multiple of the identity, or {n} rows of {n} numbers"
         if len(set(texts)) == 1:
@@ -338,23 +333,19 @@ class Field:
         return f"with these numbers on its diagonal it is [{', '.join(f'[{row}]' for row in rows)}]"
 
     def _wrong_count(self, found: int, wanted: int, what: str, help: str = "") -> T | None:
-        texts = [node.text.strip() for node in self._nodes if isinstance(node, Scalar)]
+        texts = self.node.texts
         if any(";" in text for text in texts):
             help = "entries are separated by commas: [..., ...]"
         elif found > wanted and what == "numbers" and all(text.lstrip("+-").isdecimal() for text in texts):
             help = help or "if a comma was meant as a decimal point, write the point"
-        if found == 1 and wanted > 1 and isinstance(self._nodes[0], ListNode) and "rows" not in what:
+        if found == 1 and wanted > 1 and self.node.items[0].kind == "list" and "rows" not in what:
             help = help or "one pair of brackets is too many"
         entries = "1 entry" if found == 1 else f"{found} entries"
         return self.fail(
             codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {_counted(wanted, what)}", help
         )
 
-    @property
-    def _nodes(self) -> tuple[Node, ...]:
-        return self.node.items if isinstance(self.node, ListNode) else ()
-
-    def _unknown(self, key: Scalar, known: Sequence[str]) -> list[str]:
+    def _unknown(self, key: Node, known: Sequence[str]) -> list[str]:
         """Reports an unknown key; returns the known ones that it may stand for."""
         if len(self.reader.findings) > MOST:
             self._at(codes.UNKNOWN_KEY, key, "unknown key")
@@ -371,14 +362,14 @@ class Field:
         return meant
 
     def _wrong_type(self, wanted: str, help: str = "") -> T | None:
-        if isinstance(self.node, BrokenNode):
+        if self.node.kind == "broken":
             return None  # has been reported
-        found = "a list" if isinstance(self.node, ListNode) else "a mapping"
-        if isinstance(self.node, Scalar):
+        found = "a list" if self.node.kind == "list" else "a mapping"
+        if self.node.kind == "scalar":
             found = f"the text {self.node.text[:40]!r}" if self.node.text else "nothing"
             if not self.node.style and _DECIMAL.fullmatch(self.node.text):
                 found = f"the number {self.node.text[:40]}"
-        instead = of_value(self.path, self.node.text if isinstance(self.node, Scalar) else "")
+        instead = of_value(self.path, self.node.text)
         name = self.path or self.reader.document
         return self.fail(codes.WRONG_TYPE, f"{name} must be {wanted}, not {found}", instead or help)
 
@@ -387,14 +378,16 @@ def root_field(reader: Reader, node: Node | None) -> Field:
     """The whole document; an empty file is an empty text."""
     start = Mark(line=0, column=0)
     return Field(
-        reader=reader, path="", node=node or Scalar(start=start, source=reader.source, end=start, text="")
+        reader=reader,
+        path="",
+        node=node or Node(kind="scalar", start=start, source=reader.source, end=start, text=""),
     )
 
 
 def is_of_another_kind(root: Field, kinds: Mapping[str, tuple[str, str]]) -> bool:
     """Reports a file of ours of another kind, by how one of its keys reads: what it lacks would be beside the point."""
-    for key, node in root.node.pairs if isinstance(root.node, MappingNode) else ():
-        text = f"{key.text}: {node.text if isinstance(node, Scalar) else ''}"
+    for key, node in root.node.pairs:
+        text = f"{key.text}: {node.text}"
         if told := next((told for start, told in kinds.items() if text.startswith(start)), None):
             root.fail(codes.WRONG_TYPE, *told)
             return True

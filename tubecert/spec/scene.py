@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Final
 
 from tubecert import letters
 from tubecert.spec import codes, keys
-from tubecert.spec.document import Scalar
 from tubecert.spec.keys import PAIR, YES, Kind, entry, expressions, inside, key, number, section
 from tubecert.spec.names import Names
 from tubecert.spec.plan import Trajectory
@@ -45,7 +44,7 @@ def _read_plane(field: Field, names: Names) -> tuple[str, str] | None:
 
 def _polygon(field: Field, names: Names) -> Matrix | None:
     """The corners of a simple polygon: its edges meet at common corners only."""
-    if isinstance(field.node, Scalar):
+    if field.node.kind == "scalar":
         field.items(None, "corners")
         return None
     items = field.items(None, "corners") or []

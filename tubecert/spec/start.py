@@ -9,7 +9,6 @@ from typing import Any, Final
 
 from tubecert.expression import ZERO, number_text, substitute, to_text
 from tubecert.spec import codes
-from tubecert.spec.document import MappingNode
 from tubecert.spec.keys import LIST, NAME, PAIR, form, key, number, numbers_text, section
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.plan import Trajectory, read_ends
@@ -84,7 +83,7 @@ def _box(
     field: Field, planned: Callable[[], Vector | None], names: Names, *, point: bool
 ) -> tuple[Ends, ...] | None:
     """Values or ranges of every state, or by state; a state that is not named starts on the plan."""
-    if not isinstance(field.node, MappingNode):
+    if field.node.kind != "mapping":
         items = field.items(len(names.states), "numbers") or ()
         return whole(read_ends(item, names, point=point) for item in items)
     entries = field.mapping(optional=names.states)

@@ -23,7 +23,6 @@ from tubecert.expression import (
 )
 from tubecert.spec import codes, keys
 from tubecert.spec.algebra import dependent_columns
-from tubecert.spec.document import ListNode, MappingNode
 from tubecert.spec.instead import glued
 from tubecert.spec.keys import NUMBER, SIZE, each, entry, expressions, form, key, numbers_text, section
 from tubecert.spec.lookup import SLOPES, TABLE
@@ -271,8 +270,8 @@ def no_uncertainty(field: Field, inputs: int) -> Uncertainty:
 
 def _read_bounds(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | None:
     """Declared bounds, those that are needed among them."""
-    nodes = [node for _, node in field.node.pairs] if isinstance(field.node, MappingNode) else []
-    if any(isinstance(node, MappingNode) for node in nodes):
+    nodes = [node for _, node in field.node.pairs] if field.node.kind == "mapping" else []
+    if any(node.kind == "mapping" for node in nodes):
         return _combined(field, names, needed)
     entries = BOUNDS.entries(field, needed)
     values = BOUNDS.sound(entries, names)
@@ -302,7 +301,7 @@ def _combined(field: Field, names: Names, needed: tuple[str, ...]) -> Bounds | N
 
 def _bound(field: Field, names: Names, columns: int | None) -> Fraction | Vector | None:
     """|w|, or |w_i| by column of E."""
-    if not isinstance(field.node, ListNode):
+    if field.node.kind != "list":
         return field.number(names.values, least=0, side="above")
     items = field.items(columns, "numbers, one per column of E") or []
     return whole(item.number(names.values, least=0, side="above") for item in items) or None

@@ -20,7 +20,6 @@ from typing import Final
 from tubecert.expression import suggestion
 from tubecert.findings import capped
 from tubecert.spec import codes, keys
-from tubecert.spec.document import Scalar
 from tubecert.spec.interpolation import DIGITS, rounded
 from tubecert.spec.keys import key, section
 from tubecert.spec.names import TIME, Names
@@ -54,7 +53,7 @@ def _read_columns(field: Field, names: Names) -> tuple[Column, ...] | None:
 
 
 def _read_column(name: str, field: Field | None, names: Names) -> Column | None:
-    if field is not None and isinstance(field.node, Scalar):
+    if field is not None and field.node.kind == "scalar":
         return Column(name=field.node.text)
     found: Column | None = Column() if field is None else _COLUMN.read(field, names)
     if field is not None and found is not None and (not found.scale or (name == "t" and found.scale < 0)):

@@ -11,7 +11,6 @@ from typing import Any, ClassVar, Final, Literal
 from tubecert import letters
 from tubecert.expression import number_text
 from tubecert.spec import codes, keys
-from tubecert.spec.document import Scalar
 from tubecert.spec.keys import AUTO, CHOSEN, Kind, Section, entry, key, named, number, says, section, word
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field
@@ -39,7 +38,7 @@ def read_name(field: Field) -> str | None:
 
 
 def _gap(field: Field, _: Names) -> str | None:
-    text = field.node.text if isinstance(field.node, Scalar) else ""
+    text = field.node.text
     if re.fullmatch(r"[0-9./eE%+-]+", text) is None:
         return field.word((AUTO,))
     help = f"write auto here; a number is an option: --gap {text[:20]}"
@@ -118,7 +117,7 @@ def _predictor(field: Field, names: Names) -> Fraction | object | None:
     """The g of A_m = -g I."""
     if says(field, AUTO):
         return CHOSEN
-    if not isinstance(field.node, Scalar):
+    if field.node.kind != "scalar":
         message = f"{field.path} is a matrix; the predictor is a multiple of the identity"
         help = "write auto, or a negative number: -10 stands for -10 I; no matrix serves better than auto"
         return field.fail(codes.STABILITY, message, help)
@@ -142,7 +141,7 @@ _SMOOTH: Final = Section(
 
 
 def _projection(field: Field, names: Names) -> Fraction | object | None:
-    if isinstance(field.node, Scalar):
+    if field.node.kind == "scalar":
         return CHOSEN if field.word(("hard",)) else None
     return (_SMOOTH.sound(_SMOOTH.entries(field), names) or {}).get("smooth")
 
