@@ -14,7 +14,7 @@ from typing import Literal
 from tubecert.bounds.clearance import Shape
 from tubecert.certificate.effective import Asked, Effective
 from tubecert.certificate.notes import joined, split
-from tubecert.claims.failures import Outcome
+from tubecert.claims.failures import Attempt
 from tubecert.claims.family import Assumption, Reason
 from tubecert.conditions.inputs import InputBound
 from tubecert.conditions.theorem import Recipe
@@ -30,20 +30,8 @@ from tubecert.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AttemptData:
-    """One proposal of a synthesis and what became of it."""
-
-    rate: float
-    degree: int
-    floor: Literal["identity", "input"]
-    route: str
-    outcome: Outcome
-    condition_number: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MetricRow:
-    """One metric of a comparison; `input_gain` is beta/sqrt(a), `adaptation_rate` the least of the distance form."""
+    """One metric of a comparison; `input_gain` is beta/sqrt(a) over the tube, `adaptation_rate` the least of B."""
 
     rate: Fraction
     floor: Literal["identity", "input"]
@@ -90,7 +78,7 @@ class SearchData:
 
     objective: str
     verdict: Verdict
-    attempts: tuple[AttemptData, ...]
+    attempts: tuple[Attempt, ...]
     rate: Fraction | None = None
     table: tuple[MetricRow, ...] = ()
     limits: RateLimits | None = None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import Literal
 
 from tubecert.claims.family import Claim, Member, Reason, Said, plain
 from tubecert.digits import near
@@ -50,6 +52,23 @@ class ConditionUnbounded(Outcome):
 
     says = "{route}: the condition number could not be bounded"
     route: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """One proposal of a synthesis and what became of it; `condition_number` is proven, None if nothing was."""
+
+    rate: float
+    degree: int
+    floor: Literal["identity", "input"]
+    route: str
+    outcome: Outcome
+    condition_number: float | None = None
+
+    @property
+    def undecided(self) -> bool:
+        """Whether it may be a metric, but its proof ran out of boxes."""
+        return isinstance(self.outcome, NotProven) and self.outcome.verdict is Verdict.UNDECIDED
 
 
 class Failure(Member, Tagged):

@@ -6,7 +6,7 @@ section 4d.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
@@ -95,12 +95,3 @@ class LimitedInput:
             return Verdict.REFUTED
         proven = bool(bounds) and all(bound is not None and self.holds(bound) for bound in bounds)
         return Verdict.CERTIFIED if proven else Verdict.UNDECIDED
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JudgedInput:
-    """An input with limits, its bounds by the kinds that are proven (their keys), and the verdict on the limits."""
-
-    input: LimitedInput
-    bounds: Mapping[str, InputBound]
-    verdict: Verdict

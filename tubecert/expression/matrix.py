@@ -125,7 +125,8 @@ def adjugate(a: Rows) -> Matrix:
     """The matrix with a adj(a) = det(a) I."""
 
     def cofactor(i: int, j: int) -> Expression:
-        return (-1) ** (i + j) * determinant([[*row[:i], *row[i + 1 :]] for k, row in enumerate(a) if k != j])
+        minor = determinant([[*row[:i], *row[i + 1 :]] for k, row in enumerate(a) if k != j])
+        return -minor if (i + j) % 2 else minor
 
     return matrix([[cofactor(i, j) for j in range(len(a))] for i in range(len(a))])
 

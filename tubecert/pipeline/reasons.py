@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from tubecert.certificate.result import ClearanceData, InputData
 from tubecert.claims.advice import (
     HalveConstant,
     LeavePlanRoom,
@@ -21,13 +22,13 @@ from tubecert.claims.advice import (
 )
 from tubecert.claims.family import Reason, Relax
 from tubecert.claims.statements import ConditionHolds, InputWithinLimits, ObstacleCleared
-from tubecert.conditions.inputs import InputBound, JudgedInput, LimitedInput
+from tubecert.conditions.inputs import InputBound, LimitedInput
 from tubecert.conditions.problem import Shortfall
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.interval import Interval
 from tubecert.kinds.kind import Section
 from tubecert.search.proposers import Explained
-from tubecert.stages.bounded import Bounded, Cleared
+from tubecert.stages.bounded import Bounded
 from tubecert.stages.judged import Judged
 from tubecert.verdict import Verdict
 
@@ -46,25 +47,26 @@ def reasons(section: Section[Any], explained: Explained) -> list[Reason]:
 
 def obstacle_reasons(bounded: Bounded) -> list[Reason]:
     """Obstacles that the tube is asked to keep away from, and is not proven to."""
+    asked = zip(bounded.question.spec.obstacles, bounded.clearances, strict=True)
     return [
         Reason(
             claim=ObstacleCleared(obstacle=number, clearance=each.clearance),
             verdict=each.verdict,
-            at=_witness(bounded, each),
+            at=_witness(bounded, obstacle.states, each),
             relax=(ReduceRadii(),),
         )
-        for number, each in enumerate(bounded.clearances, start=1)
-        if each.obstacle.decides and each.verdict is not Verdict.CERTIFIED
+        for number, (obstacle, each) in enumerate(asked, start=1)
+        if each.decides and each.verdict is not Verdict.CERTIFIED
     ]
 
 
-def _witness(bounded: Bounded, cleared: Cleared) -> Witness:
+def _witness(bounded: Bounded, plane: tuple[str, str], cleared: ClearanceData) -> Witness:
     """The plan where it is nearest, moved to the point of the obstacle that was found."""
-    t, states = cleared.found.t, bounded.question.spec.states
+    t, states = cleared.t or 0.0, bounded.question.spec.states
     centre, _ = bounded.enclosed.tube.plan.enclose(np.array([t]), np.array([t]))
     x = [float(value) for value in centre.mid[0]]
-    if cleared.found.inside is not None:
-        for name, value in zip(cleared.obstacle.states, cleared.found.inside, strict=True):
+    if cleared.inside is not None:
+        for name, value in zip(plane, cleared.inside, strict=True):
             x[states.index(name)] = value
     return Witness(t=t, x=tuple(x))
 
@@ -73,15 +75,15 @@ def input_reasons(judged: Judged) -> list[Reason]:
     """Inputs that are not proven to stay within their limits, where the gains are proven; and plans that do not."""
     certified = all(judged.sections[key].verdict is Verdict.CERTIFIED for key in judged.deciding)
     return [
-        _beyond(each, judged.deciding)
-        for each in judged.inputs
+        _beyond(own, each, judged.deciding)
+        for own, each in zip(judged.bounded.inputs, judged.inputs, strict=True)
         if each.verdict is Verdict.REFUTED or (certified and each.verdict is not Verdict.CERTIFIED)
     ]
 
 
-def _beyond(judged: JudgedInput, deciding: tuple[str, ...]) -> Reason:
+def _beyond(own: LimitedInput, judged: InputData, deciding: tuple[str, ...]) -> Reason:
     """By which limit an input misses most, and what takes it there."""
-    own, low, high = judged.input, *judged.input.limits
+    low, high = own.limits
     if own.leaves is not None:
         upper = own.greatest.below > high
         claim = InputWithinLimits(

@@ -5,13 +5,11 @@ In: proven metrics. Out: records for a certificate, a metric file and reports.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from fractions import Fraction
+from dataclasses import dataclass, field, fields
 from math import inf, log
 
 from tubecert.certificate.effective import Asked
 from tubecert.certificate.result import (
-    AttemptData,
     MetricFile,
     MetricRow,
     RateLimits,
@@ -19,13 +17,12 @@ from tubecert.certificate.result import (
     SynthesisData,
 )
 from tubecert.claims.advice import MendPlan
+from tubecert.claims.failures import Attempt
 from tubecert.claims.family import Claim, Reason
 from tubecert.claims.statements import PlanBounded, PlanInSafeSet, StartInTube
 from tubecert.pipeline.deadline import Cut
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
-from tubecert.synthesis.ladder import Attempt
-from tubecert.synthesis.problem import Floor
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict
 
@@ -34,30 +31,19 @@ _NARROWER = 0.01  # of the tube, in its logarithm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class Row(MetricRow):
     """One metric of a comparison.
 
     `verdict` is that of the kinds that decide, `claim` what failed; `alone`: certificate 0 holds, whatever decides;
     `mend`: what the plan lacks, if its defect alone takes the whole tube.
-    `input_gain`: beta/sqrt(a) over the tube; `adaptation_rate`: the least of the distance form. `bandwidth` and
-    `demand` are of the kind that decides: what it needs of the filter, and the adaptation rate. `width`: of the tube in
-    the outputs that were asked for; None: its radius counts.
+    `bandwidth` and `demand` are of the kind that decides: what it needs of the filter, and the adaptation rate.
+    `width`: of the tube in the outputs that were asked for; None: its radius counts.
     """
 
-    rate: Fraction
-    floor: Floor
-    degree: int
-    condition_number: float
-    verdict: Verdict | None = None
     claim: Claim | None = None
     alone: bool = False
     mend: MendPlan | None = None
-    input_gain: float | None = None
-    rho: float | None = None
     width: float | None = None
-    ultimate_radius: float | None = None
-    adaptation_rate: float | None = None
-    bandwidth: float | None = None
     demand: float = inf
     metric: VerifiedMetric = field(repr=False)
 
@@ -97,18 +83,7 @@ class Row:
 
     def data(self) -> MetricRow:
         """As certificates and reports hold it."""
-        return MetricRow(
-            rate=self.rate,
-            floor=self.floor,
-            degree=self.degree,
-            condition_number=self.condition_number,
-            verdict=self.verdict,
-            input_gain=self.input_gain,
-            rho=self.rho,
-            ultimate_radius=self.ultimate_radius,
-            adaptation_rate=self.adaptation_rate,
-            bandwidth=self.bandwidth,
-        )
+        return MetricRow(**{item.name: getattr(self, item.name) for item in fields(MetricRow)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +114,7 @@ class Synthesised:
         return SearchData(
             objective=self.wanted.objective,
             verdict=self.verdict,
-            attempts=tuple(map(_attempt, self.attempts)),
+            attempts=self.attempts,
             rate=self.wanted.rate,
             table=tuple(row.data() for row in self.rows),
             limits=self.limits,
@@ -147,14 +122,3 @@ class Synthesised:
             solver=None if self.file is None else self.file.solver,
             reason=self.reason,
         )
-
-
-def _attempt(attempt: Attempt) -> AttemptData:
-    return AttemptData(
-        rate=attempt.rate,
-        degree=attempt.degree,
-        floor=attempt.floor,
-        route=attempt.route,
-        outcome=attempt.outcome,
-        condition_number=attempt.condition_number,
-    )

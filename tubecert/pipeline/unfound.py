@@ -12,15 +12,12 @@ from tubecert.claims.advice import (
     RaiseBudget,
     ShrinkSafeSet,
 )
-from tubecert.claims.failures import (
-    NoneCertified,
-    NothingFound,
-)
+from tubecert.claims.failures import Attempt, NoneCertified, NothingFound
 from tubecert.claims.family import Relax
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Spec
 from tubecert.synthesis.family import suggested
-from tubecert.synthesis.ladder import Attempt, Ladder
+from tubecert.synthesis.ladder import Ladder
 from tubecert.verdict import Verdict
 
 

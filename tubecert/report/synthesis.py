@@ -12,7 +12,8 @@ from tubecert.report.claimed import place
 from tubecert.report.page import Block, Facts, Items, Page, Section, Table, Words
 
 if TYPE_CHECKING:
-    from tubecert.certificate.result import AttemptData, MetricFile, MetricRow, RateLimits, SearchData
+    from tubecert.certificate.result import MetricFile, MetricRow, RateLimits, SearchData
+    from tubecert.claims.failures import Attempt
 
 FLOORS = {"identity": "kappa", "input": "input gain"}
 _SHOWN = 12  # attempts
@@ -126,7 +127,7 @@ def _compared(found: Sequence[MetricRow]) -> Table:
     return Table.of((">rate", *([">degree"] if degrees else []), *heads), rows, _COLUMNS)
 
 
-def _tried(attempts: Sequence[AttemptData]) -> Iterator[Block]:
+def _tried(attempts: Sequence[Attempt]) -> Iterator[Block]:
     lines = [f"rate {short(a.rate, 6)}, degree {a.degree}: {a.outcome.told()}" for a in attempts[-_SHOWN:]]
     if left := len(attempts) - len(lines):
         yield Words(text=f"{left} attempts before these")

@@ -9,11 +9,12 @@ from fractions import Fraction
 from math import isfinite
 from typing import TypeVar
 
-from tubecert.bounds.clearance import Clearance, Section, Shape, clearance
+from tubecert.bounds.clearance import Section, clearance
 from tubecert.bounds.compute import bound_constants
 from tubecert.bounds.constants import BoundConstants
 from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import residual_constants, wind_constants
+from tubecert.certificate.result import ClearanceData
 from tubecert.claims.advice import DeclareUncertaintyBound, RaiseBudget, ShrinkTube
 from tubecert.claims.statements import ConstantBounded, UncertaintyBound
 from tubecert.conditions.inputs import LimitedInput
@@ -65,25 +66,6 @@ class Enclosed:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cleared:
-    """An obstacle, and what is proven of the clearance of the tube from it."""
-
-    obstacle: Obstacle
-    shape: Shape
-    found: Clearance
-
-    @property
-    def clearance(self) -> Constant:
-        """The clearance as it is printed."""
-        return Constant(below=self.found.below, above=self.found.above).printable()
-
-    @property
-    def verdict(self) -> Verdict:
-        """On the clearance."""
-        return self.found.verdict
-
-
-@dataclass(frozen=True, kw_only=True)
 class Bounded:
     """What every kind needs is bounded, and what was declared holds.
 
@@ -94,7 +76,7 @@ class Bounded:
     enclosed: Enclosed
     half_widths: Mapping[str, float]
     geodesics: GeodesicTest
-    clearances: tuple[Cleared, ...] = ()
+    clearances: tuple[ClearanceData, ...] = ()
     inputs: tuple[LimitedInput, ...] = ()
 
     def __post_init__(self) -> None:
@@ -194,14 +176,21 @@ def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -
     )
 
 
-def _cleared(enclosed: Enclosed, obstacle: Obstacle) -> Cleared:
+def _cleared(enclosed: Enclosed, obstacle: Obstacle) -> ClearanceData:
     """How far the tube keeps from an obstacle."""
     tube, states = enclosed.tube, enclosed.question.spec.states
     first, second = (states.index(name) for name in obstacle.states)
     shape = enclosed.suprema.shape_in(first, second)
     section = Section(columns=(first, second), reach=_reach(tube), shape=shape, upper=_largest(tube))
     found = clearance(tube.plan, obstacle, section, enclosed.question.effort)
-    return Cleared(obstacle=obstacle, shape=shape, found=found)
+    return ClearanceData(
+        verdict=found.verdict,
+        decides=obstacle.decides,
+        clearance=Constant(below=found.below, above=found.above).printable(),
+        t=found.t,
+        shape=shape,
+        inside=found.inside,
+    )
 
 
 def _largest(tube: TubeFound) -> float:

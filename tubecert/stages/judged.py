@@ -8,7 +8,8 @@ from functools import cached_property
 from typing import Any
 
 from tubecert.bounds.constants import DERIVED, Meaning
-from tubecert.conditions.inputs import JudgedInput, LimitedInput
+from tubecert.certificate.result import InputData, PlanInputData
+from tubecert.conditions.inputs import LimitedInput
 from tubecert.conditions.theorem import Proposal
 from tubecert.enclosure.constant import Constant
 from tubecert.kernel import overall
@@ -42,21 +43,23 @@ class Judged:
     @property
     def verdict(self) -> Verdict:
         """The worst of those that decide."""
-        obstacles = [each.verdict for each in self.bounded.clearances if each.obstacle.decides]
+        obstacles = [each.verdict for each in self.bounded.clearances if each.decides]
         inputs = [each.verdict for each in self.inputs]
         return overall([*(self.sections[key].verdict for key in self.deciding), *obstacles, *inputs])
 
     @cached_property
-    def inputs(self) -> tuple[JudgedInput, ...]:
+    def inputs(self) -> tuple[InputData, ...]:
         """What is proven of the inputs that have limits."""
         return tuple(map(self._judged, self.bounded.inputs))
 
-    def _judged(self, own: LimitedInput) -> JudgedInput:
+    def _judged(self, own: LimitedInput) -> InputData:
         found = {key: section.input_bound(own) for key, section in self.sections.items()}
-        return JudgedInput(
-            input=own,
-            bounds={key: bound for key, bound in found.items() if bound is not None},
+        return InputData(
+            input=own.name,
+            limits=own.limits,
             verdict=own.verdict([found[key] for key in self.deciding]),
+            plan=PlanInputData(least=own.least, greatest=own.greatest),
+            bounds={key: bound for key, bound in found.items() if bound is not None},
         )
 
     def derived(self) -> dict[str, tuple[Constant, Meaning]]:

@@ -12,13 +12,10 @@ from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
 from tubecert.certificate.result import (
     Bound,
-    ClearanceData,
     Geodesics,
-    InputData,
     MetricData,
     Overrides,
     PlanData,
-    PlanInputData,
     Recipes,
     Result,
     Source,
@@ -34,14 +31,13 @@ from tubecert.certificate.sections import (
     plan_data,
 )
 from tubecert.claims.family import Reason
-from tubecert.conditions.inputs import JudgedInput
 from tubecert.conditions.theorem import Recipe
 from tubecert.expression import number_text
 from tubecert.letters import ALL, name_of
 from tubecert.metric.verify import MetricProof
 from tubecert.printable import visible
 from tubecert.spec import Spec, canonical
-from tubecert.stages.bounded import Bounded, Cleared, Enclosed
+from tubecert.stages.bounded import Bounded, Enclosed
 from tubecert.stages.judged import Judged
 from tubecert.stages.metric import ProvenMetric
 from tubecert.stages.options import Options
@@ -106,8 +102,8 @@ def result_of(end: Stage | Stopped, why: Explanation) -> Result:
         synthesis=question.synthesis,
         metric=_metric(reached),
         tube=_tube(reached),
-        clearance=() if bounded is None else tuple(map(clearance_data, bounded.clearances)),
-        inputs=() if judged is None else tuple(map(_input_data, judged.inputs)),
+        clearance=() if bounded is None else bounded.clearances,
+        inputs=() if judged is None else judged.inputs,
         constants=_constants(reached),
         sections={} if judged is None else {key: each.data() for key, each in judged.sections.items()},
         elasticities=None if judged is None else why.elasticities,
@@ -223,30 +219,6 @@ def _constants(reached: _Reached) -> dict[str, Bound]:
     own = {name: constant_data(value, meaning) for name, value, meaning in all_of_tube}
     derived = {} if judged is None else judged.derived()
     return own | {name: constant_data(value, meaning) for name, (value, meaning) in derived.items()}
-
-
-def clearance_data(found: Cleared) -> ClearanceData:
-    """An obstacle, as it is written."""
-    return ClearanceData(
-        verdict=found.verdict,
-        decides=found.obstacle.decides,
-        clearance=found.clearance,
-        t=found.found.t,
-        shape=found.shape,
-        inside=found.found.inside,
-    )
-
-
-def _input_data(found: JudgedInput) -> InputData:
-    """An input with limits, as it is written."""
-    own = found.input
-    return InputData(
-        input=own.name,
-        limits=own.limits,
-        verdict=found.verdict,
-        plan=PlanInputData(least=own.least, greatest=own.greatest),
-        bounds=found.bounds,
-    )
 
 
 def _recipes(judged: Judged | None) -> dict[str, Recipe]:

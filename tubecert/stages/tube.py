@@ -219,7 +219,7 @@ def _leaving(planned: Planned, radius: Radius) -> Stopped:
         side = radius.rho if radius.sides is None else radius.sides[i]
         width = None if asked is None else asked[i]
         if contained.room > 0 and (asked is None or width is not None):
-            own = float(contained.room * (radius.rho / side if width is None else 1))
+            own = float(contained.room) * (float(radius.rho / side) if width is None else 1.0)
             relax = (FitTube(most=own, state=None if width is None else contained.state), *relax)
         beyond = None if radius.sides is None else too_wide(side, contained, width)
         if width is not None and beyond is not None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import inf, sqrt
 
-from tubecert.claims.failures import Outcome, Proven
+from tubecert.claims.failures import Attempt, Outcome, Proven
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import round_down
 from tubecert.metric.verify import Proofs
@@ -19,7 +19,7 @@ from tubecert.model import ControlAffineModel
 from tubecert.progress import Phase, Progress, Step
 from tubecert.synthesis.family import Choice, MetricFamily, metric_family
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
-from tubecert.synthesis.rounding import Rejected, VerifiedMetric, shortest_proven
+from tubecert.synthesis.rounding import VerifiedMetric, shortest_proven
 
 Route = Callable[[SynthesisProblem], Proposal]
 Box = tuple[tuple[Fraction, Fraction], ...]
@@ -50,22 +50,6 @@ class Request:
     proofs: Proofs = field(default_factory=Proofs)
     pace: Fraction = Fraction(1)
     progress: Progress | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Attempt:
-    """One proposal and what became of it; `condition_number` is proven, None if nothing was.
-
-    `undecided`: its proof ran out of boxes.
-    """
-
-    rate: float
-    degree: int
-    floor: Floor
-    route: str
-    outcome: Outcome
-    condition_number: float | None = None
-    undecided: bool = False
 
 
 def kappa(metric: VerifiedMetric) -> float:
@@ -266,7 +250,7 @@ class Ladder:
             if not proposal.kappa < _POLISHES * kappa(best):
                 break
             outcome = self._judged(problem, proposal, best.rate, effort)
-            if isinstance(outcome, Rejected):
+            if isinstance(outcome, Outcome):
                 break
             best = min(best, outcome, key=kappa)
         return best
@@ -351,19 +335,17 @@ class Ladder:
 
     def _judged(
         self, problem: SynthesisProblem, proposal: Proposal, rate: Fraction, effort: Effort
-    ) -> VerifiedMetric | Rejected:
+    ) -> VerifiedMetric | Outcome:
         """What the proof makes of a proposal, which is kept and told."""
         outcome = shortest_proven(problem, proposal, rate, effort, self.request.proofs)
-        rejected = outcome if isinstance(outcome, Rejected) else None
-        number = None if isinstance(outcome, Rejected) else outcome.condition_number.above
+        number = outcome.condition_number.above if isinstance(outcome, VerifiedMetric) else None
         attempt = Attempt(
             rate=float(rate),
             degree=problem.family.degree,
             floor=problem.floor,
             route=proposal.route,
-            outcome=Proven() if rejected is None else rejected.outcome,
+            outcome=Proven() if isinstance(outcome, VerifiedMetric) else outcome,
             condition_number=number,
-            undecided=rejected is not None and rejected.undecided,
         )
         self.attempts.append(attempt)
         if isinstance(outcome, VerifiedMetric):

@@ -23,7 +23,6 @@ from tubecert.synthesis.attack import Attack, Attacker
 from tubecert.synthesis.family import Choice, MetricFamily, functions_at
 from tubecert.synthesis.forms import FormsTape
 from tubecert.synthesis.problem import Floor, Proposal, SynthesisProblem
-from tubecert.verdict import Verdict
 
 _DIGITS = (2, 3, 4, 5, 6, 7, 9, 12)
 _WORTH, _SHARP = 1.005, 1.0002  # a shorter metric may have a condition number larger by this factor
@@ -50,36 +49,28 @@ class VerifiedMetric:
     proposal: Proposal = field(repr=False)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rejected:
-    """Why no rounding of a proposal is a metric: what failed with the most digits.
-
-    `undecided`: it may be one, but the proof ran out of boxes.
-    """
-
-    outcome: Outcome
-    undecided: bool = False
-
-
 def shortest_proven(
     problem: SynthesisProblem,
     proposal: Proposal,
     rate: Fraction,
     effort: Effort,
     proofs: Proofs | None = None,
-) -> VerifiedMetric | Rejected:
-    """The proposal with few digits, proven at `rate`, of nearly the same condition number; or why it is not proven."""
+) -> VerifiedMetric | Outcome:
+    """The proposal with few digits, proven at `rate`, of nearly the same condition number.
+
+    Or why no rounding of it is: what failed with the most digits.
+    """
     values = proposal.coefficients
     if values is None or not np.all(np.isfinite(values)) or not np.any(values):
-        return Rejected(outcome=NoProposal(route=proposal.route, status=proposal.status))
+        return NoProposal(route=proposal.route, status=proposal.status)
     n = len(problem.model.states)
     if values.shape != (len(problem.family.functions), n, n):
-        return Rejected(outcome=WrongShape(route=proposal.route))
+        return WrongShape(route=proposal.route)
     functions = functions_at(problem.family, problem.safe_set)
     first, *rest = _worth_proving(problem, values, rate, functions)
     known = proofs or Proofs()
 
-    def proven(digits: int) -> VerifiedMetric | Rejected:
+    def proven(digits: int) -> VerifiedMetric | Outcome:
         dual = problem.family.dual_metric(rounded(values, digits, functions))
         proof = known.of(replace(problem.model, W=dual, rate=rate), problem.safe_set, effort)
         return _failure(proposal, proof) or VerifiedMetric(
@@ -171,11 +162,9 @@ def _decimal(value: float, scale: float, digits: int) -> Fraction:
     return round(Fraction(value) / unit) * unit
 
 
-def _failure(proposal: Proposal, proof: MetricProof) -> Rejected | None:
+def _failure(proposal: Proposal, proof: MetricProof) -> Outcome | None:
     """Why a metric is not proven, or of no use; None if it is."""
     if proof.failed is not None:
-        failed = NotProven(route=proposal.route, condition=proof.failed, verdict=Verdict(proof.verdict))
-        return Rejected(outcome=failed, undecided=failed.verdict is Verdict.UNDECIDED)
-    if not isfinite(proof.condition_number().above):
-        return Rejected(outcome=ConditionUnbounded(route=proposal.route))
-    return None
+        return NotProven(route=proposal.route, condition=proof.failed, verdict=proof.verdict)
+    known = isfinite(proof.condition_number().above)
+    return None if known else ConditionUnbounded(route=proposal.route)
