@@ -12,6 +12,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Interval
 from tubecert.expression import constant, parse, symbol
 from tubecert.spec import Obstacle
+from tubecert.spec.scene import Disc
 from tubecert.trajectory.plan import Plan, constant_plan
 
 EFFORT = Effort(gap=1e-2, absolute=0.0, budget=100_000)
@@ -33,7 +34,7 @@ CIRCLE = plan("sin(t)", "cos(t)")
 
 
 def disc(x, y, r):
-    return Obstacle(states=("a", "b"), center=(Fraction(x), Fraction(y)), radius=Fraction(r))
+    return Obstacle(states=("a", "b"), disc=Disc(center=(Fraction(x), Fraction(y)), radius=Fraction(r)))
 
 
 def polygon(*corners):

@@ -33,6 +33,12 @@ def test_what_is_rounded_lies_on_its_side_and_near(p: Fraction, n: int, shift: F
     assert parse_number(number_text(near)) == near
 
 
+def test_the_sides_of_an_angle_are_near_each_other_whatever_balls_others_use() -> None:
+    with balls.precision(53):
+        below, above = (parse_number("15 deg", side=side) for side in ("below", "above"))
+    assert below < above < below * (1 + Fraction(1, 10**28))
+
+
 @pytest.mark.parametrize(
     ("text", "degrees"),
     [

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tubecert.simulation.adaptive.judge import of_plan, of_run, of_tube
 from tubecert.simulation.obstacles import signed_distance
 from tubecert.spec import Obstacle, load_text
+from tubecert.spec.scene import Disc
 
 SPEC = """
 tubecert: 1
@@ -64,7 +65,7 @@ def test_distance_inside_is_negative_and_to_the_boundary():
 
 
 def test_distance_to_a_disc():
-    disc = Obstacle(states=("a", "c"), center=(Fraction(1), Fraction(0)), radius=Fraction(1, 2))
+    disc = Obstacle(states=("a", "c"), disc=Disc(center=(Fraction(1), Fraction(0)), radius=Fraction(1, 2)))
     np.testing.assert_allclose(signed_distance(disc, np.array([[1.0, 0.0], [3.0, 0.0]])), [-0.5, 1.5])
 
 

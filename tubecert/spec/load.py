@@ -23,7 +23,7 @@ from tubecert.spec.machine import (
     read_hardware,
 )
 from tubecert.spec.metric import METRIC, WANTED, Metric, Synthesis, read_metric
-from tubecert.spec.names import TIME, Names, read_names, with_outputs
+from tubecert.spec.names import TIME, Names, read_names
 from tubecert.spec.override import Setting, put
 from tubecert.spec.plan import PLANS, at_rest, completed, read_trajectory, trajectory_data
 from tubecert.spec.reader import Field, Reader, is_of_another_kind, root_field
@@ -51,7 +51,6 @@ from tubecert.spec.tube import (
     TUBE,
     Tube,
     decides_data,
-    expected_data,
     measured,
     read_expectation,
     read_name,
@@ -113,7 +112,7 @@ class File:
     """What the actuators can do: [lower, upper] for some or all inputs. How far each input can go in the loop is
     proven, and must stay within; this decides the verdict as well."""
     simulation = entry(keys.inside(SIMULATION), late=True)
-    expect = entry(keys.inside(EXPECT, write=expected_data), late=True)
+    expect = entry(keys.inside(EXPECT), late=True)
 
 
 _FORM: Final[dict[str, Any]] = {
@@ -218,7 +217,6 @@ def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None
     names = read_names(system) if system else None
     if system is None or names is None:
         return None  # without names nothing else can be read
-    names = with_outputs(names, system.get("outputs"))
     found = _read_named(root.reader, entries, system, names, alone=alone)
     if found is None or name is None:
         return None

@@ -157,7 +157,7 @@ def _foreign(
 
 
 def read_names(system: Mapping[str, Field]) -> Names | None:
-    """States, inputs and parameters; None if the states or inputs are unusable."""
+    """All that has a name; None if the states or inputs are unusable."""
     taken: dict[str, str] = {}
     states = _name_list(system.get("states"), "state", taken)
     inputs = _name_list(system.get("inputs"), "input", taken)
@@ -176,10 +176,11 @@ def read_names(system: Mapping[str, Field]) -> Names | None:
         parameters=tuple((name, value.fraction) for name, value in values.items() if value.is_constant),
         irrational=tuple((name, value) for name, value in values.items() if not value.is_constant),
         ranges=tuple(ranges.items()),
-        rates=tuple(rates_of_states(system.get("f"), states).items()),
+        rates=tuple(_rates_of_states(system.get("f"), states).items()),
     )
     names = _with_tables(names, system.get("tables"), taken)
-    return _with_definitions(names, system.get("definitions"), taken)
+    names = _with_definitions(names, system.get("definitions"), taken)
+    return _with_outputs(names, system.get("outputs"), taken)
 
 
 def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[str, ...] | None:
@@ -195,11 +196,11 @@ def _name_list(field: Field | None, what: str, taken: dict[str, str]) -> tuple[s
         help = f"write [{', '.join(items[0].node.texts)[:60]}]: one pair of brackets is too many"
         message = f"{items[0].path} must be the name of {_with_article(what)}, not a list"
         return items[0].fail(codes.WRONG_TYPE, message, help)
-    names = [new_name(item.text(f"the name of {_with_article(what)}"), item, what, taken) for item in items]
+    names = [_new_name(item.text(f"the name of {_with_article(what)}"), item, what, taken) for item in items]
     return tuple(name for name in names if name) if all(names) else None
 
 
-def new_name(name: str | None, field: Field, what: str, taken: dict[str, str]) -> str | None:
+def _new_name(name: str | None, field: Field, what: str, taken: dict[str, str]) -> str | None:
     """A name that the file gives, if it may be used; it is one of `taken` then."""
     if name is None:
         return None
@@ -248,7 +249,7 @@ def _read_parameters(
     """
     values: dict[str, Expression] = {}
     ranges: dict[str, Ends] = {}
-    found = list(new_names(field, "of names to numbers", "parameter", taken))
+    found = list(_new_names(field, "of names to numbers", "parameter", taken))
     for i, (name, entry, _) in enumerate(found):
         later = [other for _, _, other in found[i + 1 :]]
         if entry.node.kind == "list":
@@ -298,7 +299,7 @@ def _rises(first: str, second: str) -> bool:
 
 def _with_tables(names: Names, field: Field | None, taken: dict[str, str]) -> Names:
     """Tables by name; one that cannot be read stands as 1 everywhere."""
-    for name, entry, written in new_names(field, "of names to tables", "table", taken):
+    for name, entry, written in _new_names(field, "of names to tables", "table", taken):
         found = read_lookup(written, entry, names.values)
         if name is not None:
             names = replace(names, tables=(*names.tables, (name, found or UNKNOWN)))
@@ -307,7 +308,7 @@ def _with_tables(names: Names, field: Field | None, taken: dict[str, str]) -> Na
 
 def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) -> Names:
     """Definitions in the order of the file; each may use those before it. One that cannot be read stands as 1."""
-    found = list(new_names(field, "of names to expressions", "definition", taken))
+    found = list(_new_names(field, "of names to expressions", "definition", taken))
     for i, (name, entry, _) in enumerate(found):
         later = [other for _, _, other in found[i + 1 :]]
         scope = names.of_definition()
@@ -324,13 +325,13 @@ def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) 
     return names
 
 
-def new_names(
+def _new_names(
     field: Field | None, purpose: str, what: str, taken: dict[str, str], shown: str = "NAME: ..."
 ) -> Iterator[tuple[str | None, Field, str]]:
     """The names that a mapping gives, None for those that may not be used, with the values and what is written."""
     for key, node in (field.pairs(purpose, shown) or ()) if field else ():
         assert field is not None
-        yield new_name(key.text, key_field(field, key), what, taken), field.child(key, node), key.text
+        yield _new_name(key.text, key_field(field, key), what, taken), field.child(key, node), key.text
 
 
 def key_field(field: Field, key: Node) -> Field:
@@ -338,12 +339,12 @@ def key_field(field: Field, key: Node) -> Field:
     return Field(reader=field.reader, path=f"{field.path}.{key.text[:60]}", node=key)
 
 
-def with_outputs(names: Names, field: Field | None) -> Names:
-    """The names with those of the outputs; one that cannot be read stands for the first state."""
+def _with_outputs(names: Names, field: Field | None, taken: dict[str, str]) -> Names:
+    """Outputs by name; one that cannot be read stands for the first state."""
     found: list[Output] = []
     example = f"{names.states[-1]} - 0.5*{names.states[0]}"
     purpose = "of names to linear combinations of states"
-    for name, entry, written in new_names(field, purpose, "output", _taken(names), "tip: x + 0.5*y"):
+    for name, entry, written in _new_names(field, purpose, "output", taken, "tip: x + 0.5*y"):
         term = entry.term(names.of_state())
         output = None if term is None else _linear(written, term, names)
         if term is not None and output is None:
@@ -367,19 +368,7 @@ def _linear(name: str, term: Term, names: Names) -> Output | None:
     return Output(name=name, row=tuple(slope.fraction for slope in slopes))
 
 
-def _taken(names: Names) -> dict[str, str]:
-    """What the names of a system stand for."""
-    groups = {
-        "state": names.states,
-        "input": names.inputs,
-        "parameter": (*names.values, *dict(names.ranges)),
-        "table": dict(names.tables),
-        "definition": dict(names.definitions),
-    }
-    return {name: what for what, group in groups.items() for name in group}
-
-
-def rates_of_states(f: Field | None, states: Sequence[str]) -> dict[str, str]:
+def _rates_of_states(f: Field | None, states: Sequence[str]) -> dict[str, str]:
     """What to say of each name that reads as the derivative of a state (dz, zdot), which is what f says, and not z.
 
     f is taken as it is written, read or not.

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from tubecert import letters
 from tubecert.spec import codes, keys
-from tubecert.spec.keys import PAIR, YES, Kind, entry, expressions, inside, key, number, section
+from tubecert.spec.keys import PAIR, YES, Kind, expressions, inside, key, number, section
 from tubecert.spec.names import Names
 from tubecert.spec.plan import Trajectory
 from tubecert.spec.reader import Field, whole
@@ -82,11 +82,8 @@ def _turn(a: Vector, b: Vector, c: Vector) -> int:
 
 def _folded(first: Segment, second: Segment) -> bool:
     """Whether an edge runs back along the one before it, or has no length."""
-    (a, b), (_, c) = first, second
-    if b in (a, c):
-        return True
-    ahead = (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1])
-    return _turn(a, b, c) == 0 and ahead < 0
+    a, b, c = *first, second[1]
+    return _turn(a, b, c) == 0 and (_between(first, c) or _between(second, a))
 
 
 def _meet(first: Segment, second: Segment) -> bool:
@@ -106,40 +103,45 @@ def _between(ends: Segment, point: Vector) -> bool:
     return all(min(p, q) <= value <= max(p, q) for p, q, value in zip(*ends, point, strict=True))
 
 
-_DISC: Final = keys.Section(
-    words="A disc.",
-    keys={
-        "center": entry(keys.numbers(2, PAIR), words="Its centre.", needed=True),
-        "radius": entry(number(above=0, side="above"), words="Its radius; > 0.", needed=True),
-    },
-)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disc:
+    """A disc."""
+
+    center: Vector = key(keys.numbers(2, PAIR))
+    """Its centre."""
+    radius: Fraction = key(number(above=0, side="above"))
+    """Its radius; > 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacle:
     """An obstacle: a polygon or a disc.
 
-    Corners (K, 2), or a centre and a radius, in the plane of two states; `decides`: whether the verdict asks for
-    clearance from it.
+    In the plane of two states, corners (K, 2) of the one; `decides`: whether the verdict asks for clearance from it.
     """
 
     states: tuple[str, str] = key(Kind(_read_plane, _PLANE), late=True, needed=False, example=["px", "pz"])
     """The two states of its plane; may be left out if there are only two."""
     polygon: Matrix = key(
-        Kind(_polygon, _CORNERS, keys.rows_of_numbers),
-        (),
-        late=True,
-        example=[[0.5, 0.5], [0.9, 0.5], [0.7, 0.9]],
+        Kind(_polygon, _CORNERS, keys.rows_of_numbers), (), example=[[0.5, 0.5], [0.9, 0.5], [0.7, 0.9]]
     )
     """Corners, once each, in the order in which one meets them going round."""
-    disc: ClassVar = entry(inside(_DISC), into="", late=True)
-    center: Vector = ()
-    radius: Fraction | None = None
-    decides: bool = key(replace(YES, write=lambda told, _: told), True, name="decide", late=True, said=True)
+    disc: Disc | None = key(inside(section(Disc)), None)
+    decides: bool = key(replace(YES, write=lambda told, _: told), True, name="decide", said=True)
     """false: the clearance is told and does not decide the verdict."""
 
     def __post_init__(self) -> None:
-        assert (len(self.polygon) >= 3) == (self.radius is None)
+        assert (len(self.polygon) >= 3) == (self.disc is None)
+
+    @property
+    def center(self) -> Vector:
+        """The centre of a disc."""
+        return self.disc.center if self.disc else ()
+
+    @property
+    def radius(self) -> Fraction | None:
+        """The radius of a disc; None of a polygon."""
+        return self.disc.radius if self.disc else None
 
     def contains(self, x: Fraction | float, y: Fraction | float) -> bool:
         """Whether a point that is on no edge lies in it, exactly for fractions: by Jordan's lemma for polygons."""
@@ -174,12 +176,8 @@ def _obstacle(field: Field, names: Names) -> Obstacle | None:
         message = "an obstacle is either a polygon or a disc"
         help = "write polygon: [[...], ...], or disc: {center: [...], radius: r}"
         return field.fail(codes.MISSING_KEY, message, help)
-    decides = YES.read(entries["decide"], names) is not False if "decide" in entries else True
-    if "polygon" in entries:
-        corners = _polygon(entries["polygon"], names)
-        return Obstacle(states=plane, polygon=corners, decides=decides) if plane and corners else None
-    disc = _DISC.sound(_DISC.entries(entries["disc"]), names)
-    return Obstacle(states=plane, **disc, decides=decides) if plane and disc else None
+    found = OBSTACLE.sound(entries, names)
+    return None if plane is None or found is None else Obstacle(states=plane, **found)
 
 
 def _plane(field: Field | None, owner: Field, names: Names) -> tuple[str, str] | None:
@@ -195,11 +193,8 @@ def _plane(field: Field | None, owner: Field, names: Names) -> tuple[str, str] |
 
 def obstacles_data(obstacles: Iterable[Obstacle], spec: Any) -> list[dict[str, Any]]:
     """The canonical form; that one decides goes without saying."""
-    found = []
-    for own in obstacles:
-        told = {name: value for name, value in OBSTACLE.written(own, spec).items() if value is not True}
-        found.append(told if own.radius is None else told | {"disc": _DISC.written(own, spec)})
-    return found
+    found = (OBSTACLE.written(own, spec) for own in obstacles)
+    return [{name: told for name, told in own.items() if told is not True} for own in found]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

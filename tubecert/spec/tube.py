@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, Final, Literal
 
 from tubecert import letters
 from tubecert.expression import number_text
@@ -207,59 +207,51 @@ _RANGE: Final = keys.ends(
 class Expectation:
     """A locked result: `check --certify` fails if the certificate, or the verification of a metric alone, says anything
     else. Beside hardware: verdict, half_widths and inputs.
-
-    A verdict, what is known of the metric, and `ranges` by their names, those of half-widths after a dot.
     """
 
     verdict: str | None = key(word(*VERDICTS), None)
     """The verdict; not of a metric alone."""
     metric: str | None = key(word(*METRICS.values()), None)
     """Whether C1-C3 hold on the safe set at the metric's rate."""
-    half_widths: ClassVar = entry(named("lengths", _RANGE), example={"q": ["0.05", "0.2"]})
+    half_widths: tuple[tuple[str, Ends], ...] = key(
+        named("lengths", _RANGE), (), example={"q": ["0.05", "0.2"]}
+    )
     """By state, [least, most] of the half-width of the tube, whatever the time."""
-    rho: ClassVar = entry(_RANGE)
+    rho: Ends | None = key(_RANGE, None)
     """[least, most] of the tube's radius."""
-    clearance: ClassVar = entry(_RANGE)
+    clearance: Ends | None = key(_RANGE, None)
     """[least, most] of the least clearance of the tube from an obstacle."""
-    inputs: ClassVar = entry(_RANGE)
+    inputs: Ends | None = key(_RANGE, None)
     """[least, most] of the largest share of its limits that an input uses: 0 in the middle of them, 1 at one of
     them."""
-    bandwidth: ClassVar = entry(_RANGE)
+    bandwidth: Ends | None = key(_RANGE, None)
     """[least, most] of the bandwidth omega, in rad/s."""
-    adaptation_rate: ClassVar = entry(_RANGE)
+    adaptation_rate: Ends | None = key(_RANGE, None)
     """[least, most] of the adaptation rate Gamma."""
-    largest_rate: ClassVar = entry(_RANGE)
+    largest_rate: Ends | None = key(_RANGE, None)
     """The largest rate that the metric is proven to support, in 1/s."""
-    ranges: tuple[tuple[str, Ends], ...]
+
+    @property
+    def ranges(self) -> list[tuple[str, Ends]]:
+        """What ranges are expected of, those of half-widths after a dot."""
+        alone = ((name, getattr(self, name)) for name in EXPECT.keys if name not in _NO_RANGES)
+        widths = ((f"{WIDTHS}.{name}", ends) for name, ends in self.half_widths)
+        return [(name, ends) for name, ends in (*alone, *widths) if ends is not None]
 
 
 EXPECT: Final = section(Expectation)
 
 
-def expected_data(own: Expectation, _spec: Any) -> dict[str, Any]:
-    """The canonical form: ranges `a.b` are mappings within `a`."""
-    data: dict[str, Any] = {}
-    for path, ends in own.ranges:
-        name, _, below = path.partition(".")
-        told = keys.numbers_text(ends)
-        data[name] = data.get(name, {}) | {below: told} if below else told
-    verdicts = {"verdict": own.verdict, "metric": own.metric}
-    return data | {name: word for name, word in verdicts.items() if word is not None}
-
-
 _ALONE: Final = ("metric", "largest_rate")
+_NO_RANGES: Final = ("verdict", "metric", WIDTHS)
 
 
 def read_expectation(field: Field | None, names: Names, *, alone: bool) -> Expectation | None:
     """Locked results: verdicts, and [least, most] of numbers of the certificate; `alone`: of a metric alone."""
-    entries = EXPECT.entries(field)
-    if entries is None:
-        return None
-    for name in entries.keys() - _ALONE if alone else ():
-        message = f"{entries[name].path} in a question about a metric alone"
-        help = f"write metric: {', '.join(METRICS.values())}; the number that can be expected is largest_rate"
-        entries[name].fail(codes.RANGE, message, help)
-    said = EXPECT.values(entries, names)
-    verdict, metric, widths = (said.pop(name, None) for name in ("verdict", "metric", WIDTHS))
-    of_widths = tuple((f"{WIDTHS}.{name}", ends) for name, ends in widths or ())
-    return Expectation(verdict=verdict, metric=metric, ranges=(*said.items(), *of_widths))
+    for name in EXPECT.keys.keys() - _ALONE if alone and field else ():
+        if own := field and field.get(name):
+            message = f"{own.path} in a question about a metric alone"
+            help = f"write metric: {', '.join(METRICS.values())}; the number that can be expected is largest_rate"
+            own.fail(codes.RANGE, message, help)
+    found: Expectation | None = EXPECT.read(field, names)
+    return found
