@@ -7,7 +7,7 @@ import balls
 import mpmath
 import pytest
 from balls import ball
-from flint import arb
+from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,7 +34,7 @@ def test_what_is_rounded_lies_on_its_side_and_near(p: Fraction, n: int, shift: F
 
 
 def test_the_sides_of_an_angle_are_near_each_other_whatever_balls_others_use() -> None:
-    with balls.precision(53):
+    with ctx.workprec(53):
         below, above = (parse_number("15 deg", side=side) for side in ("below", "above"))
     assert below < above < below * (1 + Fraction(1, 10**28))
 

@@ -137,9 +137,9 @@ def _ends(e: Expression) -> tuple[Fraction, Fraction]:
 
     with ctx.workprec(BITS):
         found = values([e], {})
-    if found is None:
-        raise ZeroDivisionError
-    return middle(found[0].lower()), middle(found[0].upper())
+        if found is None:
+            raise ZeroDivisionError
+        return middle(found[0].lower()), middle(found[0].upper())
 
 
 def root_above(square: Fraction) -> Fraction:
