@@ -174,6 +174,37 @@ def test_a_family_is_handed_its_plan():
 
 
 @pytest.mark.slow
+def test_after_the_end_the_last_command_is_held_also_where_the_plan_goes_on():
+    """A planner that hands in more, and a formula after 2^30 samples: u* was added to the last correction."""
+    family, formula = loop(handmade.ANY), loop(handmade.WAVE % ", afterwards: repeat", afterwards="repeat")
+    x, u = np.array([0.1, 0.0]), np.array([0.25])
+    before = [family.step(x, x, u + k / 100) for k in range(50)][-1]
+    assert family.state["status"] == 0
+    assert family.step(x, x, u - 1) == before
+    assert family.state["status"] == END
+
+    formula.state["k"] = 2**30 - 1
+    last = formula.data.plan.at([2**30 - 1])[0][0]
+    before = formula.step(last)
+    assert [formula.step(last), formula.state["status"]] == [before, END]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])
+def test_a_plan_that_is_missing_holds_the_last_command(missing):
+    """It was the lowest of all inputs, and the highest for inf."""
+    own = loop(handmade.ANY)
+    x, u = np.array([0.1, 0.0]), np.array([0.25])
+    assert own.step(x, x, u * missing) == 0, "before there is one: 0, as far as limits let it"
+    held = own.step(x + 0.1, x, u)
+    assert own.state["status"] == 0
+    kept = own.state.copy()
+    assert own.step(x, x, u * missing) == held != 0
+    assert (own.state["status"], own.state["bad"]) == (BAD, 2)
+    assert (own.state["zeta"] == kept["zeta"]).all()
+
+
+@pytest.mark.slow
 def test_inputs_stay_in_the_range_and_a_limit_that_acts_is_told():
     big = handmade.tables(1)
     big.N[:] = [[100.0, 0.0]]
@@ -208,7 +239,7 @@ def test_the_self_test_passes_and_notices_a_wrong_step_or_plan(tmp_path, traject
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only"])
+@pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only", "-D_M_FP_FAST"])
 def test_fast_math_is_refused(tmp_path, flag):
     with pytest.raises(TubecertError, match="removes the test"):
         build(shipped(tmp_path / "c"), [flag, "-c", "controller.c"])

@@ -28,7 +28,7 @@ FLAGS: Final = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
 class Controller:
     """As many controllers side by side as there are `lanes`, before their first sample; each has a state of its own.
 
-    `state` is what the code keeps, an array of records (lanes,): `zeta` (z,), `delta` (m,), `k`, `bad`, `status`
+    `state` is what the code keeps, an array of records (lanes,): `zeta` (z,), `delta` and `u` (m,), `k`, `bad`, `status`
     (see controller.h).
     Raises TC711 where there is no C compiler.
     """
@@ -36,7 +36,7 @@ class Controller:
     def __init__(self, data: Data, lanes: int = 1) -> None:
         self.data = data
         n, m, z = data.sizes
-        fields = [("zeta", data.real, (max(z, 1),)), ("delta", data.real, (m,))]
+        fields = [("zeta", data.real, (max(z, 1),)), ("delta", data.real, (m,)), ("u", data.real, (m,))]
         counts = [(name, np.uint32) for name in ("k", "bad", "status")]
         self.state = np.zeros(lanes, dtype=np.dtype([*fields, *counts], align=True))
         self._shapes = ((lanes, n), *(((lanes, n), (lanes, m)) if data.plan.at is None else ()))

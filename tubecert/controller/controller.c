@@ -2,7 +2,7 @@
    multiply-adds or without, loses at most gamma(NZ + NX + 3) of the sum of their sizes, which is proven for. */
 #define CONTROLLER_TABLES
 #include "controller.h"
-#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "compile without -ffast-math: it removes the test for what is not a number"
 #endif
 
@@ -11,33 +11,35 @@
 
 static real clip(real v, real low, real high) { return v >= low ? (v <= high ? v : high) : low; }
 
-void controller_start(State *s) {
-  static const State nothing;
-  *s = nothing;
-}
+static int finite_number(real v) { return v - v == 0; }
+
+void controller_start(State *s) { *s = (State){.k = 0}; }
 
 #ifdef PLAN_TABLE
-static void plan(uint32_t k, real xs[NX], real us[NU]) {
-  const uint32_t row = k < STEPS ? k : STEPS - 1;
+static void plan(uint32_t row, real xs[NX], real us[NU]) {
   for (int i = 0; i < NX; i++) xs[i] = XS[row][i];
   for (int j = 0; j < NU; j++) us[j] = US[row][j];
 }
 #endif
 
 uint32_t controller_step(State *s, const real y[NX], PLAN_GIVEN real u[NU]) {
-  real dy[NX] = {0}, zeta[NZ ? NZ : 1];
-  const uint32_t lasting = s->status & STATUS_BAD;
-  uint32_t status = s->k < STEPS ? 0 : STATUS_END;
-  int used = status == 0;
+  real dy[NX], zeta[NZ ? NZ : 1];
+  int used = 1;
+  if (s->k >= STEPS) {
+    for (int j = 0; j < NU; j++) u[j] = s->u[j];
+    return s->status = STATUS_END;
+  }
 #ifndef PLAN_HANDED
   real xs[NX], us[NU];
   plan(s->k, xs, us);
 #endif
-  for (int i = 0; i < NX && status != STATUS_END; i++) {
+  for (int j = 0; j < NU; j++) used = used && finite_number(us[j]); /* what is handed in may be missing */
+  uint32_t status = used ? 0 : STATUS_BAD;
+  for (int i = 0; i < NX; i++) {
     dy[i] = y[i] - xs[i];
     if (dy[i] >= -REACH[i] && dy[i] <= REACH[i]) continue;
     status = STATUS_BAD;
-    if (lasting && dy[i] - dy[i] == 0) /* finite, and not the first: no glitch, so it is steered against */
+    if ((s->status & STATUS_BAD) && finite_number(dy[i])) /* not the first: no glitch, so it is steered against */
       dy[i] = clip(dy[i], -FAR * REACH[i], FAR * REACH[i]);
     else
       used = 0;
@@ -49,8 +51,8 @@ uint32_t controller_step(State *s, const real y[NX], PLAN_GIVEN real u[NU]) {
       for (int i = 0; i < NX; i++) sum += N[j][i] * dy[i];
       s->delta[j] = sum;
     }
-    const real wanted = us[j] + s->delta[j];
-    u[j] = clip(wanted, LOW[j], HIGH[j]);
+    const real wanted = finite_number(us[j]) ? us[j] + s->delta[j] : s->u[j];
+    u[j] = s->u[j] = clip(wanted, LOW[j], HIGH[j]);
     if (u[j] != wanted) status |= STATUS_CLIPPED;
   }
   if (used) {
@@ -62,8 +64,8 @@ uint32_t controller_step(State *s, const real y[NX], PLAN_GIVEN real u[NU]) {
     }
     for (int i = 0; i < NZ; i++) s->zeta[i] = zeta[i];
   }
-  s->bad += status & STATUS_BAD;
-  if (s->k < STEPS && ++s->k == STEPS) s->k = AFTER;
+  if (status & STATUS_BAD) s->bad++;
+  s->k = s->k + 1 < STEPS ? s->k + 1 : AFTER;
   return s->status = status;
 }
 

@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include "controller_data.h"
 
-#define STATUS_BAD 1u     /* the sample is not finite, or further from the plan than is proven: see README.txt */
+#define STATUS_BAD 1u     /* the sample or the plan is not finite, or they are too far apart: see README.txt */
 #define STATUS_END 2u     /* the plan has ended, and what is proven with it: the last command is held */
 #define STATUS_CLIPPED 4u /* a limit acted, which it never does while the assumptions of the certificate hold */
 
@@ -20,7 +20,8 @@
 typedef struct {
   real zeta[NZ ? NZ : 1]; /* the state of the controller */
   real delta[NU];         /* the last good correction of the plan's input */
-  uint32_t k;             /* number of the next sample */
+  real u[NU];             /* the last command */
+  uint32_t k;             /* which sample of the plan is next */
   uint32_t bad;           /* how many samples were bad */
   uint32_t status;        /* of the last sample: STATUS_... or 0 */
 } State;
