@@ -102,7 +102,7 @@ def test_every_kind_is_there_without_being_named():
     (glance, *_) = page_of(comparison).sections[0].blocks
     named = [row[0].text for row in glance.rows]
     assert [name for name in named if name in map(str, NAMES)] == [str(n) for n in NAMES if n.key in own]
-    found = {each.key for each in quantities(comparison.sides[0].result)}
+    found = {each.key for each in quantities(comparison.results[0])}
     assert {f"{name.key}.verdict" for name in NAMES if name.key in own} <= found
 
 

@@ -44,12 +44,12 @@ class Comparison(Shown):
     @property
     def names(self) -> tuple[str, ...]:
         """What the certificates are called."""
-        return tuple(self.sides.names)
+        return self.sides.names
 
     @property
     def quantities(self) -> Mapping[str, tuple[Value, ...]]:
         """Every quantity by its key."""
-        return MappingProxyType({key: tuple(values) for key, values in self.sides.rows()})
+        return MappingProxyType(dict(self.sides.values))
 
     @property
     def differences(self) -> Mapping[str, tuple[Tree, ...]]:
@@ -68,7 +68,7 @@ class Comparison(Shown):
 
     @property
     def html(self) -> str:
-        """As a page with figures."""
+        """As a page."""
         return html.render_page(page_of(self.sides))
 
     @property

@@ -6,7 +6,7 @@ that its certificate states. What a certificate does not have is shown as missin
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
@@ -39,74 +39,66 @@ _MOST = 60  # differences shown on a page
 _LONG = 60  # characters of one
 _DOWN = ("clearance", "limit", "least")  # what is bounded from below
 _SPECIFICATION = "specification"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Compared:
-    """One of the certificates, with the name that it has beside the others."""
-
-    name: str
-    certificate: AnyCertificate
-    found: Mapping[str, Quantity]
-
-    def value(self, key: str) -> Value:
-        """A quantity; None where this certificate has none."""
-        own = self.found.get(key)
-        return None if own is None else own.value
-
-    @property
-    def result(self) -> AnyResult:
-        """What was proven."""
-        return self.certificate.result
+_GLANCE = ("half_width", "clearance", "least", "greatest")  # beside rho: how quantities begin that come first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Certificates, every quantity that one of them has, and the keys of the specification that differ, by path."""
+    """Certificates by their names, in one order, and what one of them has: None where another has it not.
 
-    sides: tuple[Compared, ...]
+    `values` are those of `verdict`, `failed` and every quantity, by key; `differences` are the keys of the
+    specification that differ, by path.
+    """
+
+    names: tuple[str, ...]
+    certificates: tuple[AnyCertificate, ...]
     quantities: tuple[Quantity, ...]
+    values: Mapping[str, tuple[Value, ...]]
     differences: Mapping[str, tuple[Tree, ...]]
 
     @classmethod
     def of(cls, certificates: Sequence[tuple[str, AnyCertificate]]) -> Comparison:
         """The comparison of certificates in files of these names."""
-        sides = tuple(
-            Compared(name=name, certificate=told, found={each.key: each for each in quantities(told.result)})
-            for name, (_, told) in zip(_names([path for path, _ in certificates]), certificates, strict=True)
-        )
+        results = [told.result for _, told in certificates]
+        found = [{each.key: each for each in quantities(result)} for result in results]
+        every = tuple(merged(own.values() for own in found))
+        values: dict[str, tuple[Value, ...]] = {
+            "verdict": tuple(str(result.verdict) for result in results),
+            "failed": tuple(failed(result) or None for result in results),
+        }
+        for key in (each.key for each in every):
+            values[key] = tuple(None if key not in own else own[key].value for own in found)
         return cls(
-            sides=sides,
-            quantities=tuple(merged(side.found.values() for side in sides)),
-            differences=_differences([side.result for side in sides]),
+            names=tuple(_names([path for path, _ in certificates])),
+            certificates=tuple(told for _, told in certificates),
+            quantities=every,
+            values=values,
+            differences=dict(_differing_in([own.spec.effective.data for own in results], "")),
         )
 
     @property
-    def names(self) -> list[str]:
-        """What the certificates are called."""
-        return [side.name for side in self.sides]
-
-    def rows(self) -> Iterator[tuple[str, list[Value]]]:
-        """Every quantity by its key, with its values."""
-        yield "verdict", [str(side.result.verdict) for side in self.sides]
-        yield "failed", [failed(side.result) or None for side in self.sides]
-        for each in self.quantities:
-            yield each.key, [side.value(each.key) for side in self.sides]
+    def results(self) -> list[AnyResult]:
+        """What was proven."""
+        return [each.result for each in self.certificates]
 
     def csv(self) -> str:
         """As comma-separated values; what a certificate has not is empty."""
+        rows = ([key, *values] for key, values in self.values.items())
         differing = (
             [f"{_SPECIFICATION}.{path}", *(None if v is None else _bracketed(v) for v in own)]
             for path, own in self.differences.items()
         )
-        rows = ([key, *values] for key, values in self.rows())
         return table_text([["quantity", *self.names], *rows, *differing])
 
     def json(self) -> dict[str, object]:
         """As values of JSON."""
+        named = zip(self.names, self.certificates, strict=True)
         return {
-            "certificates": [{"name": side.name, "hash": side.certificate.hash} for side in self.sides],
-            "quantities": {key: [_plain(value) for value in values] for key, values in self.rows()},
+            "certificates": [{"name": name, "hash": each.hash} for name, each in named],
+            "quantities": {
+                key: [exact_json(value) if isinstance(value, Fraction) else value for value in values]
+                for key, values in self.values.items()
+            },
             "differences": {path: list(own) for path, own in self.differences.items()},
         }
 
@@ -116,13 +108,13 @@ class Comparison:
 
 def page_of(comparison: Comparison) -> Page:
     """The page: verdicts, tubes and gains at a glance, every number of each kind, what differs."""
-    specifications = {side.result.spec.effective.name for side in comparison.sides}
+    specifications = {result.spec.effective.name for result in comparison.results}
     count = len(comparison.differences)
     differ = f", {count} key{'s' * (count > 1)} of their specifications differ" if count else ""
     return Page(
         name=", ".join(sorted(specifications)),
         verdict="",
-        summary=f"{len(comparison.sides)} certificates{differ or ' of the same specification'}",
+        summary=f"{len(comparison.names)} certificates{differ or ' of the same specification'}",
         meaning=NOT_RECHECKED,
         sections=tuple(Section.each(_sections(comparison))),
         about="comparison",
@@ -130,37 +122,30 @@ def page_of(comparison: Comparison) -> Page:
 
 
 def _sections(comparison: Comparison) -> Iterator[tuple[str, str, list[Block]]]:
-    plain = [each for each in comparison.quantities if not each.section]
     kinds = dict.fromkeys(each.section for each in comparison.quantities if each.section)
+    more = [each for each in comparison.quantities if each.name not in ("verdict", "failed")]
+    plain = [each for each in more if not each.section]
+    glance = [each for each in plain if each.name == "rho" or each.name.startswith(_GLANCE)]
     rows = [*_verdicts(comparison), *(_kind(comparison, key) for key in kinds)]
-    rows += (_quantity(comparison, each) for each in plain if _at_a_glance(each))
+    rows += (_quantity(comparison, each) for each in glance)
     differ = Facts.of([("differ", ", ".join(comparison.differences))], ("differ",))
     yield "glance", "At a glance", [_table(comparison, rows), *([differ] if comparison.differences else [])]
-    more = [each for each in comparison.quantities if each.name not in ("verdict", "failed")]
-    rows = [_quantity(comparison, each) for each in more if each.section or not _at_a_glance(each)]
+    rows = [_quantity(comparison, each) for each in more if each not in glance]
     yield "numbers", "Further numbers", [_table(comparison, rows)] if rows else []
     yield "differences", "What differs in the specification", [_differing(comparison)]
 
 
-def _at_a_glance(quantity: Quantity) -> bool:
-    return quantity.name == "rho" or quantity.name.startswith(
-        ("half_width", "clearance", "least", "greatest")
-    )
-
-
 def _verdicts(comparison: Comparison) -> Iterator[tuple[Cell, ...]]:
-    found = [side.result for side in comparison.sides]
-    yield _row("verdict", [Cell(text=str(own.verdict), kind="verdict") for own in found])
-    if any(map(failed, found)):
-        told = (lacking(own) if failed(own) else "" for own in found)
-        yield _row("not proven", [Cell(text=text) for text in told])
+    yield _row("verdict", (Cell(text=str(own.verdict), kind="verdict") for own in comparison.results))
+    if any(comparison.values["failed"]):
+        told = (lacking(own) if failed(own) else "" for own in comparison.results)
+        yield _row("not proven", (Cell(text=text) for text in told))
 
 
 def _kind(comparison: Comparison, key: str) -> tuple[Cell, ...]:
     """What each says of a kind, on a line: its verdict, and the gains that it is about."""
     told = []
-    for side in comparison.sides:
-        result = side.result
+    for result in comparison.results:
         if isinstance(result, SampledResult) or key not in result.sections:
             told.append(MISSING)
             continue
@@ -168,12 +153,12 @@ def _kind(comparison: Comparison, key: str) -> tuple[Cell, ...]:
         pair = section.decisive(asked=result.asked)
         gains = "" if pair is None or pair.bandwidth is None else f": {gains_text(pair)}"
         told.append(f"{section.verdict}{gains}")
-    return _row(SECTIONS[key], [Cell(text=text) for text in told])
+    return _row(SECTIONS[key], (Cell(text=text) for text in told))
 
 
 def _quantity(comparison: Comparison, quantity: Quantity) -> tuple[Cell, ...]:
-    values = [side.value(quantity.key) for side in comparison.sides]
-    cells = [Cell(text=_told(quantity, value), kind="number") for value in values]
+    values = comparison.values[quantity.key]
+    cells = (Cell(text=_told(quantity, value), kind="number") for value in values)
     return _row(quantity.words, cells, _change(quantity, values))
 
 
@@ -201,13 +186,13 @@ def _change(quantity: Quantity, values: Sequence[Value]) -> str:
     return f"{100 * (second - first) / abs(first):+.3g} %" if isfinite(first) and isfinite(second) else ""
 
 
-def _row(name: str, cells: Sequence[Cell], change: str = "") -> tuple[Cell, ...]:
+def _row(name: str, cells: Iterable[Cell], change: str = "") -> tuple[Cell, ...]:
     return (Cell(text=name), *cells, Cell(text=change, kind="number"))
 
 
 def _table(comparison: Comparison, rows: Sequence[tuple[Cell, ...]], note: str = "") -> Table:
     """A table with a column for each certificate, and the change where there are two of them."""
-    two = len(comparison.sides) == 2 and any(row[-1].text for row in rows)
+    two = len(comparison.names) == 2 and any(row[-1].text for row in rows)
     columns = ("", *comparison.names, *(("change",) if two else ()))
     return Table(columns=columns, rows=tuple(row if two else row[:-1] for row in rows), note=note)
 
@@ -232,11 +217,6 @@ def _names(paths: Sequence[str]) -> list[str]:
     return [f"{name} ({i})" if names.count(name) > 1 else name for i, name in enumerate(names, 1)]
 
 
-def _differences(results: Sequence[AnyResult]) -> dict[str, tuple[Tree, ...]]:
-    """The keys, by path, whose values are not the same in all; None where a specification has no such key."""
-    return dict(_differing_in([result.spec.effective.data for result in results], ""))
-
-
 def _differing_in(values: Sequence[Tree], path: str) -> Iterator[tuple[str, tuple[Tree, ...]]]:
     """Down to entries where all have the same shape, else the whole."""
     if all(isinstance(value, Mapping) for value in values):
@@ -259,7 +239,3 @@ def _bracketed(value: Tree) -> str:
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key}: {_bracketed(inner)}" for key, inner in value.items()) + "}"
     return f"[{', '.join(map(_bracketed, value))}]" if isinstance(value, list) else str(value)
-
-
-def _plain(value: Value) -> str | float | None:
-    return exact_json(value) if isinstance(value, Fraction) else value
