@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tubecert.digits import near
 from tubecert.letters import NAMES
@@ -12,41 +12,37 @@ from tubecert.progress import Phase, Step, Unit
 if TYPE_CHECKING:
     from tubecert.synthesis.problem import Size
 
-COUNTED: Final = {
-    Phase.CERTIFICATION: "claims",
-    Phase.PLAN: "claims",
-    Phase.GAINS: "claims",
-    Phase.RECHECK: "claims",
-    Phase.VERIFICATION: "metrics",
-    Phase.CHECK: "files",
-    Phase.SWEEP: "points",
-    Phase.SIMULATION: "runs",
-}
-_AT: Final = {
-    Phase.CERTIFICATION: "proving",
-    Phase.PLAN: "planning",
-    Phase.GAINS: "gains of certificate",
-    Phase.LOOP: "sampled loop",
-    Phase.SYNTHESIS: "looking for a metric",
-    Phase.VERIFICATION: "verifying",
-    Phase.CHECK: "checking",
-    Phase.SWEEP: "certifying points",
-    Phase.SIMULATION: "simulating",
-    Phase.FIGURES: "figures and data",
-    Phase.RECHECK: "examining",
-}
-_NEXT: Final = {
-    Phase.CERTIFICATION: "a wider --gap, a smaller safe set or tube, --jobs, or more time",
-    Phase.PLAN: "a plan of your own, fewer knots, or more time",
-    Phase.GAINS: "--conditions for one certificate only, or more time",
-    Phase.LOOP: "a nearer start, a plan or parameters in narrower ranges, or more time",
-    Phase.SYNTHESIS: "a lower --rate, --degree 0, fewer --variables, a smaller safe set, or more time",
-    Phase.VERIFICATION: "a smaller safe set, a wider --gap, or more time",
-    Phase.CHECK: "fewer files, or --jobs",
-    Phase.SWEEP: "the same command goes on where it ended",
-    Phase.SIMULATION: "fewer --runs, or a shorter --duration",
-    Phase.FIGURES: "the same command once more",
-    Phase.RECHECK: "a smaller --budget tells earlier which claims are hard",
+
+class _Words(NamedTuple):
+    """What a phase is called, what stands behind its numbers, and what to do where a command was ended in it."""
+
+    at: str
+    counted: str
+    better: str
+
+
+_SAID: Final = {
+    Phase.CERTIFICATION: _Words(
+        "proving", "claims", "a wider --gap, a smaller safe set or tube, --jobs, or more time"
+    ),
+    Phase.PLAN: _Words("planning", "claims", "a plan of your own, fewer knots, or more time"),
+    Phase.GAINS: _Words(
+        "gains of certificate", "claims", "--conditions for one certificate only, or more time"
+    ),
+    Phase.LOOP: _Words(
+        "sampled loop", "", "a nearer start, a plan or parameters in narrower ranges, or more time"
+    ),
+    Phase.SYNTHESIS: _Words(
+        "looking for a metric",
+        "",
+        "a lower --rate, --degree 0, fewer --variables, a smaller safe set, or more time",
+    ),
+    Phase.VERIFICATION: _Words("verifying", "metrics", "a smaller safe set, a wider --gap, or more time"),
+    Phase.CHECK: _Words("checking", "files", "fewer files, or --jobs"),
+    Phase.SWEEP: _Words("certifying points", "points", "the same command goes on where it ended"),
+    Phase.SIMULATION: _Words("simulating", "runs", "fewer --runs, or a shorter --duration"),
+    Phase.FIGURES: _Words("figures and data", "", "the same command once more"),
+    Phase.RECHECK: _Words("examining", "claims", "a smaller --budget tells earlier which claims are hard"),
 }
 _OF_CONSTANTS: Final = (Phase.CERTIFICATION, Phase.CHECK)
 _JOINED: Final = (Phase.CERTIFICATION, Phase.GAINS)  # where the name continues the sentence
@@ -71,7 +67,7 @@ def out_of_reach(size: Size) -> str:
 
 def next_step(phase: Phase) -> str:
     """What to do where a command was ended in a phase."""
-    return _NEXT[phase]
+    return _SAID[phase].better
 
 
 def duration(seconds: float) -> str:
@@ -89,12 +85,10 @@ def came_to(step: Step) -> str:
 
 
 def _done(step: Step) -> str:
-    counted = COUNTED.get(step.phase)
-    if counted is None or (step.of is None and not step.done):
+    counted = _SAID[step.phase].counted
+    if not counted or (step.of is None and not step.done):
         return ""
-    if step.of is None:
-        return f"{step.done} {counted} done"
-    return f"{step.done} of {step.of} {counted} done"
+    return f"{step.done} {counted} done" if step.of is None else f"{step.done} of {step.of} {counted} done"
 
 
 def _time(step: Step) -> str:
@@ -107,7 +101,8 @@ def _now(step: Step) -> str:
     """What is worked on, and what its search says."""
     name = _name(step)
     joined = " " if step.phase in _JOINED else ": "
-    words = f"{_AT[step.phase]}{joined}{name}" if name else _AT[step.phase]
+    at = _SAID[step.phase].at
+    words = f"{at}{joined}{name}" if name else at
     if step.count:
         words += f", {_counted(step)}"
     if step.share > 0:
