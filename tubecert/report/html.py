@@ -22,12 +22,12 @@ def render_page(page: Page) -> str:
 
 @cache
 def environment() -> Environment:
-    """The templates, which escape every text."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    """The templates; those of HTML escape every text."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
     environment = Environment(
         loader=PackageLoader("tubecert.report"),
-        autoescape=True,
+        autoescape=select_autoescape(),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
