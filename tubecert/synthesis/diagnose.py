@@ -13,15 +13,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, isfinite, log10
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.claims import failures
 from tubecert.expression import Expression, constant, substitute
 from tubecert.expression.matrix import null_space
 from tubecert.model import ControlAffineModel
 
-Rows = list[list[Fraction]]
+Rows = NDArray[Any]  # of fractions
 _REAL = 1e-9  # imaginary parts below it are rounding errors
 _DIGITS = (12, 6, 4, 3, 2)  # of a bound that is tried: repeated modes are known to few
 
@@ -73,12 +75,12 @@ def _at(model: ControlAffineModel, point: tuple[Fraction, ...], rate: Fraction) 
     if exact is None:
         return None
     A, B = exact
-    Z = null_space(_transposed(_reachable(A, B)))  # rows z with z [B, AB, ...] = 0
-    if not Z:
+    Z = np.array(null_space(_reachable(A, B).T.tolist()), dtype=object)  # rows z with z [B, AB, ...] = 0
+    if not len(Z):
         return None
     A_c = _restricted(A, Z)
     try:
-        modes = np.linalg.eigvals(np.array([[float(q) for q in row] for row in A_c]))
+        modes = np.linalg.eigvals(A_c.astype(float))
     except (OverflowError, np.linalg.LinAlgError):  # numbers beyond floats have no name for a report
         return None
     slowest = complex(modes[np.argmax(modes.real)])
@@ -90,9 +92,7 @@ def _at(model: ControlAffineModel, point: tuple[Fraction, ...], rate: Fraction) 
 
 def _limits(A_c: Rows, rate: Fraction) -> bool:
     """Whether some mode decays at most at this rate: no metric has a larger one. Exact."""
-    return not is_hurwitz(
-        [[q + (rate if i == j else 0) for j, q in enumerate(row)] for i, row in enumerate(A_c)]
-    )
+    return not is_hurwitz(A_c + rate * _eye(len(A_c)))
 
 
 def _near(value: float) -> list[Fraction]:
@@ -109,57 +109,44 @@ def _near(value: float) -> list[Fraction]:
 def _linearised(model: ControlAffineModel, values: dict[str, Expression]) -> tuple[Rows, Rows] | None:
     """(A, B) with the forcing input put in, if the point is an equilibrium and everything is rational there."""
     n, m = len(model.states), len(model.inputs)
+    parts = [model.f, [e for row in model.B for e in row], [e for row in model.f_x for e in row]]
+    parts.append([e for rows in model.b_x for row in rows for e in row])
     try:
-        f = _rational(substitute(model.f, values))
-        B = _rational(substitute([e for row in model.B for e in row], values))
-        slopes = _rational(substitute([e for row in model.f_x for e in row], values))
-        b_x = _rational(substitute([e for rows in model.b_x for row in rows for e in row], values))
+        exact = [_rational(substitute(part, values)) for part in parts]
     except ZeroDivisionError:
         return None
-    if f is None or B is None or slopes is None or b_x is None:
+    if any(part is None for part in exact):
         return None
-    table = [B[i * m : (i + 1) * m] for i in range(n)]
-    u = _solved(table, [-q for q in f])
-    if u is None:
-        return None
-    A = [slopes[i * n : (i + 1) * n] for i in range(n)]
-    for j in range(m):
-        for i in range(n):
-            for k in range(n):
-                A[i][k] += u[j] * b_x[(j * n + i) * n + k]
-    return A, table
+    f, B, slopes, b_x = exact
+    B = B.reshape(n, m)
+    u = _solved(B, -f)
+    return None if u is None else (slopes.reshape(n, n) + np.tensordot(u, b_x.reshape(m, n, n), 1), B)
 
 
-def _rational(entries: Sequence[Expression]) -> list[Fraction] | None:
-    if not all(e.is_constant for e in entries):
-        return None
-    return [e.fraction for e in entries]
+def _rational(entries: Sequence[Expression]) -> Any:
+    return np.array([e.fraction for e in entries]) if all(e.is_constant for e in entries) else None
 
 
-def _solved(B: Rows, right: list[Fraction]) -> list[Fraction] | None:
+def _solved(B: Rows, right: Rows) -> Rows | None:
     """U with B u = right, None if there is none."""
-    vectors = null_space([[*row, -q] for row, q in zip(B, right, strict=True)])
+    vectors = null_space(np.column_stack([B, -right]).tolist())
     chosen = next((v for v in vectors if v[-1] != 0), None)
-    return None if chosen is None else [q / chosen[-1] for q in chosen[:-1]]
+    return None if chosen is None else np.array([q / chosen[-1] for q in chosen[:-1]])
 
 
 def _reachable(A: Rows, B: Rows) -> Rows:
     """[B, AB, ..., A^(n-1) B], (n, n m)."""
     blocks = [B]
     for _ in range(len(A) - 1):
-        blocks.append(_product(A, blocks[-1]))
-    return [[q for block in blocks for q in block[i]] for i in range(len(A))]
+        blocks.append(A @ blocks[-1])
+    return np.hstack(blocks)
 
 
 def _restricted(A: Rows, Z: Rows) -> Rows:
     """A_c with Z A = A_c Z for rows Z that span a left-invariant space."""
-    image = _product(Z, A)
-    result = []
-    for row in image:
-        solved = _solved(_transposed(Z), row)
-        assert solved is not None, "the rows span an invariant space"
-        result.append(solved)
-    return result
+    solved = [_solved(Z.T, row) for row in Z @ A]
+    assert all(row is not None for row in solved), "the rows span an invariant space"
+    return np.array(solved)
 
 
 def is_hurwitz(A: Rows) -> bool:
@@ -181,26 +168,13 @@ def is_hurwitz(A: Rows) -> bool:
 
 def _characteristic(A: Rows) -> list[Fraction]:
     """Coefficients of det(s I - A), highest power first (Faddeev and LeVerrier)."""
-    n = len(A)
-    coefficients = [Fraction(1)]
-    M = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
-    for k in range(1, n + 1):
-        AM = _product(A, M)
-        c = -sum((AM[i][i] for i in range(n)), start=Fraction(0)) / k
-        coefficients.append(c)
-        M = [[q + (c if i == j else 0) for j, q in enumerate(row)] for i, row in enumerate(AM)]
+    coefficients, M = [Fraction(1)], _eye(len(A))
+    for k in range(1, len(A) + 1):
+        M = A @ M
+        coefficients.append(-M.trace() / k)
+        M = M + coefficients[-1] * _eye(len(A))
     return coefficients
 
 
-def _product(a: Rows, b: Rows) -> Rows:
-    return [
-        [
-            sum((p * q for p, q in zip(row, column, strict=True)), start=Fraction(0))
-            for column in zip(*b, strict=True)
-        ]
-        for row in a
-    ]
-
-
-def _transposed(a: Rows) -> Rows:
-    return [list(row) for row in zip(*a, strict=True)]
+def _eye(n: int) -> Rows:
+    return np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)])
