@@ -10,7 +10,6 @@ would refute, a warning what is hardly meant, a note what is worth knowing. Trus
 | `plan` | plan and start in the safe set, room for the tube, equilibria, obstacles |
 | `table` | a plan from a file against the dynamics: rows, units of time, exchanged columns |
 | `uncertainty` | h that is zero, declared bounds that are broken or loose |
-| `floats` | exact numbers as floats |
 | `metric` | C1-C3 and declared bounds at points; what no input reaches along the plan |
 """
 

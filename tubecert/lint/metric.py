@@ -18,7 +18,6 @@ from tubecert.expression.matrix import jacobian
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.codes import finding
-from tubecert.lint.floats import floats, nearest
 from tubecert.lint.plan import curve_of
 from tubecert.model import TIME, ControlAffineModel, build, place
 from tubecert.spec import Spec
@@ -52,7 +51,7 @@ def metric_findings(spec: Spec) -> list[Finding]:
 
 def _points(spec: Spec) -> Array:
     """The middle of the safe set, corners, and points inside, the same in every run; shape (K, n)."""
-    low, high = (floats([side[i] for side in spec.safe_set]) for i in (0, 1))
+    low, high = np.array(spec.safe_set, dtype=float).T
     signs = list(itertools.islice(itertools.product((0.0, 1.0), repeat=len(low)), _MOST_CORNERS))
     inside = np.random.default_rng(0).random((_POINTS, len(low)))
     shares = np.concatenate([np.full((1, len(low)), 0.5), np.array(signs), inside])
@@ -106,7 +105,7 @@ def _contraction(spec: Spec, model: ControlAffineModel, points: Array, W: Array)
     inverse = np.linalg.inv(root)
     largest = -np.linalg.eigvalsh(inverse @ (across @ drift @ N) @ inverse.transpose(0, 2, 1))[:, -1] / 2
     k = int(np.argmin(largest))
-    rate = nearest(model.rate)
+    rate = float(model.rate)
     if largest[k] < rate - _ROUNDING * max(rate, abs(float(largest[k]))):
         word = (
             f"it supports {near(largest[k], 4)} at most" if largest[k] > 0 else "it does not contract at all"
@@ -136,7 +135,7 @@ def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:
     values = np.linalg.eigvalsh(W)
     least, most = 1 / values[:, -1], 1 / values[:, 0]
     i, k = int(np.argmin(least)), int(np.argmax(most))
-    lower, upper = nearest(metric.lower), nearest(metric.upper)
+    lower, upper = float(metric.lower), float(metric.upper)
     help = "declare what holds, or remove metric.bounds: they are derived"
     for name, declared, found, at, broken, loose in (
         ("lower", lower, least[i], i, least[i] < lower * (1 - _ROUNDING), lower * _LOOSE < least[i]),
@@ -163,7 +162,7 @@ def reach_findings(spec: Spec) -> list[Finding]:
     tape = Tape([e for row in (*slopes, *model.B) for e in row], names)
     points = [*curve.x[every].T, *curve.u[every].T, curve.t[every]]
     values = tape.run_floats(points, points[-1].shape).T
-    size = np.array([nearest(high - low) / 2 for low, high in spec.safe_set])
+    size = np.array([float(high - low) / 2 for low, high in spec.safe_set])
     A = values[:, : n * n].reshape(-1, n, n) * size / size[:, None]
     B = values[:, n * n :].reshape(len(A), n, -1) / size[:, None]
     if not (np.isfinite(A).all() and np.isfinite(B).all()):
@@ -174,7 +173,7 @@ def reach_findings(spec: Spec) -> list[Finding]:
     value, direction = _by_itself(U.T @ A @ U)
     scale = max(float(np.linalg.norm(A, axis=(1, 2)).max()), 1e-300)
     asked = spec.metric.rate if spec.metric else spec.synthesis.rate if spec.synthesis else None
-    rate = 0.0 if asked is None else nearest(asked)
+    rate = 0.0 if asked is None else float(asked)
     if value <= -rate * (1 - _ROUNDING) + _ROUNDING * scale * (1 if rate else -1):
         return []
     shares = U @ direction / size

@@ -6,6 +6,7 @@ Knots, equilibria and starts are compared exactly; between knots, and along expr
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,7 +20,6 @@ from tubecert.expression import number_text
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.codes import finding
-from tubecert.lint.floats import floats, nearest
 from tubecert.lint.names import turned
 from tubecert.lint.room import least_radius, room_findings
 from tubecert.lint.table import paid, table_findings
@@ -60,38 +60,34 @@ def curve_of(spec: Spec) -> Curve:
     plan = spec.trajectory
     if plan.table is not None:
         knots = plan.table.knots
-        kept = [k for k, t in enumerate(knots.t) if plan.horizon is None or t <= plan.horizon]
+        kept = len(knots.t) if plan.horizon is None else bisect_right(knots.t, plan.horizon)
         return Curve(
-            t=floats([knots.t[k] for k in kept]),
-            x=np.array([floats(knots.x[k]) for k in kept]),
-            u=np.array([floats(knots.u[k]) for k in kept]),
+            t=np.array(knots.t[:kept], dtype=float),
+            x=np.array(knots.x[:kept], dtype=float),
+            u=np.array(knots.u[:kept], dtype=float),
             path="trajectory.file",
         )
     if plan.task is not None:
-        ends = np.array([floats(plan.task.start), floats(plan.task.target)])
-        last = math.inf if plan.horizon is None else nearest(plan.horizon)
+        ends = np.array([plan.task.start, plan.task.target], dtype=float)
+        last = math.inf if plan.horizon is None else float(plan.horizon)
         here = "trajectory.target" if plan.task.goal else "trajectory.start"
         count = 2 if plan.task.goal else 1
         u = np.zeros((count, len(spec.inputs)))
         return Curve(t=np.array([0.0, last])[:count], x=ends[:count], u=u, path=here)
     if plan.bundle is not None:  # the corners that are farthest out
-        corners = np.array([floats([ends[side] for ends in plan.bundle.x]) for side in (0, 1)])
+        corners = np.array(plan.bundle.x, dtype=float).T
         return Curve(t=np.zeros(1), x=corners, u=np.zeros((2, len(spec.inputs))), path="trajectory.x")
     count = 1 if plan.kind == "equilibrium" else _SAMPLES
-    t = np.linspace(0.0, nearest(plan.horizon or Fraction(0)), count)
+    t = np.linspace(0.0, float(plan.horizon or Fraction(0)), count)
     tape = Tape([term.expression for term in (*plan.x, *plan.u)], (TIME,))
     both = tape.run_floats([t], t.shape).T
     n = len(spec.states)
     return Curve(t=t, x=both[:, :n], u=both[:, n:], path="trajectory.at" if count == 1 else "trajectory.x")
 
 
-def _sides(spec: Spec) -> tuple[Array, Array]:
-    return floats([low for low, _ in spec.safe_set]), floats([high for _, high in spec.safe_set])
-
-
 def _excess(spec: Spec, points: Array) -> tuple[int, int, float]:
     """Where points leave the safe set by most: (point, state, by how much; negative inside)."""
-    low, high = _sides(spec)
+    low, high = np.array(spec.safe_set, dtype=float).T
     beyond = np.nan_to_num(np.maximum(low - points, points - high), nan=np.inf)
     k, i = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
     return int(k), int(i), float(beyond[k, i])
@@ -112,11 +108,11 @@ def _start(spec: Spec) -> Iterator[Finding]:
 
 def _outside(spec: Spec, curve: Curve) -> Iterator[Finding]:
     k, i, beyond = _excess(spec, curve.x)
-    scale = float(np.max(np.abs(_sides(spec))))
+    scale = float(max(abs(end) for ends in spec.safe_set for end in ends))
     if beyond > (0.0 if len(curve.t) == 1 else _ROUNDING * scale):
         when = "" if len(curve.t) == 1 else f" at t = {near(curve.t[k], 4)} s"
         name, help = spec.states[i], f"enlarge safe_set.{spec.states[i]}, or plan inside it"
-        low, high = map(nearest, spec.safe_set[i])
+        low, high = map(float, spec.safe_set[i])
         if spec.trajectory.table and turned(spec, name) and low <= math.radians(curve.x[k, i]) <= high:
             help += f"; a column in degrees is said by trajectory.columns: {{{name}: {{scale: 1 deg}}}}"
         message = f"the plan leaves the safe set{when}: {name} = {near(curve.x[k, i])}"
@@ -130,12 +126,12 @@ def _beyond_limits(spec: Spec, curve: Curve) -> Iterator[Finding]:
         return
     values = curve.u
     if plan.bundle is not None:
-        values = np.array([floats([ends[side] for ends in plan.bundle.u]) for side in (0, 1)])
+        values = np.array(plan.bundle.u, dtype=float).T
     for name, (low, high) in spec.limits:
         u = np.nan_to_num(values[:, spec.inputs.index(name)])
-        beyond = np.maximum(nearest(low) - u, u - nearest(high))
+        beyond = np.maximum(float(low) - u, u - float(high))
         k = int(np.argmax(beyond))
-        if beyond[k] > _ROUNDING * max(abs(nearest(low)), abs(nearest(high))):
+        if beyond[k] > _ROUNDING * max(abs(float(low)), abs(float(high))):
             when = "" if len(curve.t) == 1 else f" at t = {near(curve.t[k], 4)} s"
             held = plan.kind == "equilibrium"
             message = (
@@ -167,7 +163,7 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
     scale = 1e-12 * float(largest)
     if not worst > scale:
         return
-    bearable = nearest(model.rate) * least_radius(spec) if spec.hardware is None else _bearable(spec)
+    bearable = float(model.rate) * least_radius(spec) if spec.hardware is None else _bearable(spec)
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
@@ -200,13 +196,13 @@ def _equilibrium(spec: Spec) -> str:
     found = equilibrium(Plant(spec.states, spec.inputs, spec.f, spec.B, spec.safe_set), x, u)
     if found is None:
         return ""
-    at, held = (f"[{', '.join(near(nearest(value), 12) for value in each)}]" for each in found)
+    at, held = (f"[{', '.join(near(float(value), 12) for value in each)}]" for each in found)
     return f"input: {held}" if found[0] == x else f"at: {at}, input: {held}"
 
 
 def _bearable(spec: Spec) -> float:
     """A defect in units of the states per s that would cross the safe set in a second, where nothing else is known."""
-    return min(nearest(high - low) for low, high in spec.safe_set)
+    return min(float(high - low) for low, high in spec.safe_set)
 
 
 def _obstacles(spec: Spec, curve: Curve) -> Iterator[Finding]:

@@ -17,7 +17,6 @@ from tubecert.enclosure.interval import Array
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.codes import finding
-from tubecert.lint.floats import floats, nearest
 from tubecert.spec import Spec
 
 _ROUNDING = 1e-9
@@ -32,8 +31,8 @@ def least_radius(spec: Spec) -> float:
     """
     tube = spec.tube
     if tube.half_widths:
-        return nearest(min(width for _, width in tube.half_widths))
-    return _asked_radius(spec) + (0.0 if spec.within is None else nearest(spec.within))
+        return float(min(width for _, width in tube.half_widths))
+    return _asked_radius(spec) + (0.0 if spec.within is None else float(spec.within))
 
 
 def room_findings(spec: Spec, t: Array, x: Array) -> Iterator[Finding]:
@@ -53,7 +52,7 @@ def room_findings(spec: Spec, t: Array, x: Array) -> Iterator[Finding]:
     if not spec.tube.half_widths:
         yield from _too_wide(spec, t, x, (_asked_radius(spec) / widths.max() + start) * widths, "")
         return
-    asked = np.array([nearest(dict(spec.tube.half_widths).get(name, Fraction(0))) for name in spec.states])
+    asked = np.array([float(dict(spec.tube.half_widths).get(name, 0)) for name in spec.states])
     level = np.min(asked[asked > 0] / widths[asked > 0], initial=math.inf)
     if len(spec.tube.half_widths) == np.count_nonzero(asked) and start >= level * (1 + _ROUNDING):
         yield _outside(spec, offset, level * widths)
@@ -63,7 +62,7 @@ def room_findings(spec: Spec, t: Array, x: Array) -> Iterator[Finding]:
 
 def _too_wide(spec: Spec, t: Array, x: Array, sides: Array, radius: str) -> Iterator[Finding]:
     """Where the tube leaves the safe set by most, against its own width there."""
-    low, high = floats([low for low, _ in spec.safe_set]), floats([high for _, high in spec.safe_set])
+    low, high = np.array(spec.safe_set, dtype=float).T
     free = np.minimum(x - low, high - x)
     k, i = np.unravel_index(int(np.argmax(np.nan_to_num(sides - free, nan=-np.inf))), free.shape)
     side, room, name = float(sides[i]), float(free[k, i]), spec.states[i]
@@ -98,15 +97,17 @@ def _outside(spec: Spec, offset: Array, sides: Array) -> Finding:
 
 
 def _asked_radius(spec: Spec) -> float:
-    return nearest((spec.tube.epsilon or Fraction(0)) + (spec.tube.rho_a or Fraction(0)))
+    return float((spec.tube.epsilon or Fraction(0)) + (spec.tube.rho_a or Fraction(0)))
 
 
 def _offset(spec: Spec, x: Array) -> Array:
     """How far the start is from the plan's, by state: of a box its farthest corner; 0 where it is not said."""
     if spec.within is not None or spec.trajectory.task is not None:
         return np.zeros(len(spec.states))
-    spread = floats([(high - low) / 2 for low, high in spec.start_box] or [Fraction(0)] * len(spec.x0))
-    away = floats(spec.x0) - x[0]
+    spread = np.array(
+        [(high - low) / 2 for low, high in spec.start_box] or [Fraction(0)] * len(spec.x0), dtype=float
+    )
+    away = np.array(spec.x0, dtype=float) - x[0]
     return np.asarray(away + np.where(away < 0, -spread, spread))
 
 
@@ -116,5 +117,5 @@ def _constant_metric(spec: Spec) -> Array | None:
     entries = [term.expression for row in terms for term in row]
     if not entries or not all(entry.is_constant for entry in entries):
         return None
-    W = floats([entry.fraction for entry in entries]).reshape(len(terms), -1)
+    W = np.array([entry.fraction for entry in entries], dtype=float).reshape(len(terms), -1)
     return W if np.isfinite(W).all() and np.linalg.eigvalsh(W)[0] > 0 else None

@@ -18,7 +18,6 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import number_text
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import codes
-from tubecert.lint.floats import floats, nearest
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.spec import Spec, Table
 from tubecert.spec.codes import PLAN_TIMES
@@ -86,11 +85,11 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
         begins = f"the plan begins at t = {number_text(table.begins)[:40]} s, which is t = 0 from here on"
         help = "horizon, h and every t of the certificate count from there"
         yield replace(_finding(PLAN_TIMES, begins, table.rows[0], help), severity=Severity.NOTE)
-    rows = np.array([*map(floats, knots.u)])
+    rows = np.array(knots.u, dtype=float)
     each = 2 if knots.interpolation == "hermite-simpson" else 1
     points = _Points(
-        t=floats(knots.t[::each]),
-        x=np.array([*map(floats, knots.x[::each])]),
+        t=np.array(knots.t[::each], dtype=float),
+        x=np.array(knots.x[::each], dtype=float),
         u=rows[::each],
         between=rows[1::2] if each == 2 else None,
     )
@@ -100,7 +99,7 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
     worst = float(size.max())
     speed = float(np.nanmax(np.linalg.norm(dynamics.rate(points.t, points.x, points.u), axis=1), initial=0.0))
     known = spec.metric is not None and radius > 0
-    bearable = codes.NOTABLE_DEFECT * nearest(model.rate) * radius if known else _SHARE * speed
+    bearable = codes.NOTABLE_DEFECT * float(model.rate) * radius if known else _SHARE * speed
     if not worst > bearable:
         return
     found = _time_unit(table, points, dynamics, worst) or _exchanged(spec, table, points, dynamics, worst)

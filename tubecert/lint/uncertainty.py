@@ -16,7 +16,6 @@ from tubecert.expression.matrix import Matrix, column, jacobian
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.codes import finding
-from tubecert.lint.floats import nearest
 from tubecert.model import TIME, build, place
 from tubecert.spec import Spec
 
@@ -88,15 +87,15 @@ def _against(spec: Spec, name: str, declared: Fraction, needed: Supremum | None)
     """A bound that holds on the tube may be broken elsewhere in the safe set: that is a warning, too."""
     path = f"uncertainty.bounds.{name}"
     above = needed.above if needed else 0.0
-    if nearest(declared) > _LOOSE * above:
+    if float(declared) > _LOOSE * above:
         message = (
-            f"{name} is declared as {near(nearest(declared))}, but on the safe set {near(above, 3)} suffices"
+            f"{name} is declared as {near(float(declared))}, but on the safe set {near(above, 3)} suffices"
         )
         help = "declare less, or remove it: it is derived from the expression; a loose bound costs gain"
         yield finding(spec, codes.LOOSE_BOUND, path, message, help)
     elif needed and math.isfinite(needed.below) and Fraction(needed.below) > declared:
         message = (
-            f"{name} is declared as {near(nearest(declared))}, but its expression reaches "
+            f"{name} is declared as {near(float(declared))}, but its expression reaches "
             f"{near(needed.below, 4)} in the safe set, at {place(needed.at)}"
         )
         help = "declare more, unless the tube stays away from there"

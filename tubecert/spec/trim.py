@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from tubecert.expression import ZERO, Expression, symbol
 from tubecert.expression.balls import BITS, ball, middle, values
 from tubecert.expression.matrix import jacobian
+from tubecert.spec.scope import out_of_range
 from tubecert.spec.values import Ends, TermMatrix, Vector
 
 if TYPE_CHECKING:
@@ -55,7 +56,8 @@ def equilibrium(plant: Plant, x: Vector, u: Vector) -> tuple[Vector, Vector] | N
         z = [ball(own) for own in (*x, *u)]
         if _reached(entries, names, z, size, n) or _reached(entries, names, z, size, 0):
             found = [_rounded(own, unit) for own, unit in zip(z, size, strict=True)]
-            if all(low <= own <= high for own, (low, high) in zip(found, plant.box, strict=False)):
+            inside = all(low <= own <= high for own, (low, high) in zip(found, plant.box, strict=False))
+            if inside and not any(map(out_of_range, found)):
                 return tuple(found[:n]), tuple(found[n:])
     return None
 
