@@ -11,8 +11,7 @@ from tubecert.bounds.clearance import Section, Shape, clearance, directions
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Interval
 from tubecert.expression import constant, parse, symbol
-from tubecert.spec import Obstacle
-from tubecert.spec.scene import Disc
+from tubecert.spec import Disc, Obstacle
 from tubecert.trajectory.plan import Plan, constant_plan
 
 EFFORT = Effort(gap=1e-2, absolute=0.0, budget=100_000)

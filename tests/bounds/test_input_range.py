@@ -14,8 +14,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import ZERO, parse, symbol
 from tubecert.model import build
-from tubecert.spec import load_text
-from tubecert.spec.types import Knots
+from tubecert.spec import Knots, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import piecewise_plan

@@ -20,7 +20,7 @@ from tubecert.recheck import lookup as balls
 from tubecert.recheck.boxes import Field
 from tubecert.recheck.grammar import read
 from tubecert.recheck.terms import looked_up, slopes, variable
-from tubecert.spec.interpolation import cubic_slopes, monotone_slopes
+from tubecert.spec.lookup import cubic_slopes, monotone_slopes
 
 _numbers = st.integers(-60, 60).map(lambda n: Fraction(n, 7))
 

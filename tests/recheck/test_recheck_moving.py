@@ -18,8 +18,7 @@ from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.pipeline import Options, certify, synthesise
 from tubecert.pipeline.membership import membership
-from tubecert.spec import load_text
-from tubecert.spec.types import Synthesis
+from tubecert.spec import Synthesis, load_text
 
 SPEC = (Path(__file__).parents[1] / "specs/ok/moving.yaml").read_text(encoding="utf-8")
 

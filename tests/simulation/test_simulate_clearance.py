@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from tubecert.simulation.adaptive.judge import of_plan, of_run, of_tube
 from tubecert.simulation.obstacles import signed_distance
-from tubecert.spec import Obstacle, load_text
-from tubecert.spec.scene import Disc
+from tubecert.spec import Disc, Obstacle, load_text
 
 SPEC = """
 tubecert: 1

@@ -16,8 +16,7 @@ from tubecert.simulation.adaptive.judge import RunAt, check_class, compare
 from tubecert.simulation.adaptive.loops import joined
 from tubecert.simulation.adaptive.reading import Certified, Decay, promise
 from tubecert.simulation.adaptive.uncertainty import class_of
-from tubecert.spec import load_text
-from tubecert.spec.types import Output
+from tubecert.spec import Output, load_text
 from tubecert.verdict import Verdict
 
 T = np.linspace(0, 4, 81)

@@ -19,8 +19,7 @@ from tubecert.simulation.adaptive.campaign import follow
 from tubecert.simulation.adaptive.families import drawing_of, members_of
 from tubecert.simulation.adaptive.reading import adopted
 from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
-from tubecert.spec import Knots, load_text
-from tubecert.spec.types import Table
+from tubecert.spec import Knots, Table, load_text
 from tubecert.trajectory.pieces import piecewise_plan
 
 FAMILY = FAMILY_TWO + "conditions: {decides: B}\n"

@@ -11,9 +11,8 @@ from texts import replaced
 import tubecert
 from tubecert import pipeline
 from tubecert.errors import SpecError
-from tubecert.spec import Setting, canonical, load, load_text
+from tubecert.spec import Hardware, Setting, canonical, load, load_text
 from tubecert.spec.metric_file import with_metric
-from tubecert.spec.types import Hardware
 
 ROOT = Path(tubecert.__file__).parents[1]
 CONFIGS = sorted((ROOT / "configs").glob("hardware_*.yaml"))

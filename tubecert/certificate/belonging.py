@@ -19,9 +19,8 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.records import from_json, to_json
-from tubecert.spec import Knots, Setting, Spec, canonical
+from tubecert.spec import Knots, Setting, Spec, Table, canonical
 from tubecert.spec.load import again
-from tubecert.spec.types import Table
 
 _IDLE = ("name", "expect", "simulation", "system.units", "trajectory.file")
 

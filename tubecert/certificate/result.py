@@ -23,9 +23,8 @@ from tubecert.enclosure.interval import Interval
 from tubecert.kinds.kind import Pair, SectionData
 from tubecert.kinds.table import KINDS
 from tubecert.records import FormError, Json, from_json, keyed, to_json
-from tubecert.spec import Interpolation, Knots
+from tubecert.spec import Interpolation, Knots, PlanKind
 from tubecert.spec.metric_file import FORMAT
-from tubecert.spec.types import PlanKind
 from tubecert.verdict import Verdict
 
 

@@ -45,8 +45,7 @@ from tubecert.expression import number_text
 from tubecert.metric.geodesic import GeodesicTest
 from tubecert.metric.verify import MetricProof
 from tubecert.model import ControlAffineModel
-from tubecert.spec import Spec, canonical
-from tubecert.spec.types import Bundle, Disturbance
+from tubecert.spec import Bundle, Disturbance, Spec, canonical
 from tubecert.trajectory import Plan
 
 _SAMPLES = 201

@@ -38,8 +38,7 @@ from tubecert.expression.waves import frequencies
 from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
-    from tubecert.spec import Spec
-    from tubecert.spec.types import Output
+    from tubecert.spec import Output, Spec
 
 
 def nonzero(e: Expression, ranges: dict[str, Range], effort: Effort) -> Decision:

@@ -22,8 +22,7 @@ from tubecert.expression import ZERO, Expression, derivatives, free_symbols
 from tubecert.findings import Finding, Severity
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.printable import visible
-from tubecert.spec import Knots, Spec, canonical, load, load_text
-from tubecert.spec.types import Bundle
+from tubecert.spec import Bundle, Knots, Spec, canonical, load, load_text
 from tubecert.trajectory import Plan
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import TAU

@@ -18,7 +18,7 @@ from tubecert.enclosure.interval import Array, Interval, fraction_bounds
 from tubecert.sampled_loop.cells import Cells, cells_of
 from tubecert.sampled_loop.record import Cleared
 from tubecert.sampled_loop.setting import Loop
-from tubecert.spec.types import Obstacle
+from tubecert.spec import Obstacle
 from tubecert.verdict import Verdict
 
 _WINDOWS: Final = 2048

@@ -18,7 +18,7 @@ from tubecert.certificate import file
 from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
 from tubecert.records import FormError, Json, foreign, from_json, to_json
-from tubecert.spec.types import Afterwards, Hold, Knots
+from tubecert.spec import Afterwards, Hold, Knots
 from tubecert.verdict import Verdict
 
 FORMAT: Final = "tubecert-sampled-loop/1"

@@ -26,8 +26,7 @@ from tubecert.expression.matrix import column, combine, multiply
 from tubecert.model import ControlAffineModel, moving_parts, time_period
 from tubecert.sampled_loop.matrices import lengths, nothing, total
 from tubecert.sampled_loop.record import Nominal
-from tubecert.spec import Spec
-from tubecert.spec.types import Afterwards, Hold, Knots, Vector
+from tubecert.spec import Afterwards, Hold, Knots, Spec, Vector
 from tubecert.trajectory.plan import Family, Plan
 
 ROUNDING: Final = {"single": 2.0**-24, "double": 2.0**-53}

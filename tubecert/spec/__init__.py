@@ -21,22 +21,17 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 
 from tubecert.spec.canonical import canonical
 from tubecert.spec.load import load, load_question, load_text
+from tubecert.spec.machine import Hardware, Hold
+from tubecert.spec.metric import Synthesis
 from tubecert.spec.override import Setting
-from tubecert.spec.types import (
-    Hardware,
-    Interpolation,
-    Knots,
-    Obstacle,
-    Simulation,
-    Spec,
-    Synthesis,
-    Table,
-    Task,
-    Term,
-    Vector,
-)
+from tubecert.spec.plan import Afterwards, Bundle, PlanKind, Task
+from tubecert.spec.scene import Disc, Obstacle, Simulation
+from tubecert.spec.system import Disturbance
+from tubecert.spec.types import Spec
+from tubecert.spec.values import Interpolation, Knots, Output, Table, Term, Vector
 
 __all__ = [
-    "Hardware", "Interpolation", "Knots", "Obstacle", "Setting", "Simulation", "Spec", "Synthesis",
-    "Table", "Task", "Term", "Vector", "canonical", "load", "load_question", "load_text",
+    "Afterwards", "Bundle", "Disc", "Disturbance", "Hardware", "Hold", "Interpolation", "Knots", "Obstacle",
+    "Output", "PlanKind", "Setting", "Simulation", "Spec", "Synthesis", "Table", "Task", "Term", "Vector",
+    "canonical", "load", "load_question", "load_text",
 ]  # fmt: skip

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 from tubecert.spec.load import FILE, VERSION
-from tubecert.spec.metric import SYNTHESIS
+from tubecert.spec.metric import SYNTHESIS, Synthesis
 from tubecert.spec.system import SYSTEM
-from tubecert.spec.types import Spec, Synthesis
+from tubecert.spec.types import Spec
 
 _OF_LOOPS: Final = ("uncertainty", "trajectory", "initial_state", "tube", "adaptation", "conditions")
 

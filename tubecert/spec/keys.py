@@ -18,7 +18,7 @@ from tubecert.spec.reader import Field, whole
 from tubecert.spec.values import Matrix, Term, TermMatrix, Vector
 
 if TYPE_CHECKING:
-    from tubecert.spec.names import Names  # which reads tables by keys
+    from tubecert.spec.names import Names, Use  # which reads tables by keys
 
 Whose: TypeAlias = Literal["states", "inputs", "lengths"]
 Schema: TypeAlias = Mapping[str, Any]
@@ -238,12 +238,12 @@ def constants(whose: Whose) -> Kind:
     return Kind(read, LIST, texts)
 
 
-def expressions(whose: Whose, scope: str) -> Kind:
-    """A list of expressions, one per state or input, in the names of a scope (`Names.of_...`)."""
+def expressions(whose: Whose, use: Use) -> Kind:
+    """A list of expressions, one per state or input, in the names that their use allows."""
 
     def read(field: Field, names: Names) -> tuple[Term, ...] | None:
         what = f"expressions, one per {whose.removesuffix('s')}"
-        return field.terms(len(getattr(names, whose)), getattr(names, scope)(), what)
+        return field.terms(len(getattr(names, whose)), names.scope(use), what)
 
     return Kind(read, TEXTS, texts)
 

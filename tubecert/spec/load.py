@@ -25,7 +25,7 @@ from tubecert.spec.machine import (
 from tubecert.spec.metric import METRIC, WANTED, Metric, Synthesis, read_metric
 from tubecert.spec.names import TIME, Names, read_names
 from tubecert.spec.override import Setting, put
-from tubecert.spec.plan import PLANS, at_rest, completed, read_trajectory, trajectory_data
+from tubecert.spec.plan import PLANS, Trajectory, at_rest, completed, read_trajectory, trajectory_data
 from tubecert.spec.reader import Field, Reader, is_of_another_kind, root_field
 from tubecert.spec.scene import OBSTACLE, SIMULATION, obstacles_data, read_obstacles, read_simulation
 from tubecert.spec.source import Source, check_limits, read_source
@@ -35,8 +35,6 @@ from tubecert.spec.system import (
     SAFE_SET,
     SYSTEM,
     UNCERTAINTY,
-    is_uncertain,
-    known_of,
     read_disturbance,
     read_dynamics,
     read_uncertainty,
@@ -57,7 +55,8 @@ from tubecert.spec.tube import (
     read_tube,
     tube_data,
 )
-from tubecert.spec.types import Places, Spec, Term, Trajectory
+from tubecert.spec.types import Spec
+from tubecert.spec.values import Places, Term
 
 VERSION: Final = 1
 
@@ -262,18 +261,15 @@ def _read_named(
     reader: Reader, entries: Mapping[str, Field], system: Mapping[str, Field], names: Names, *, alone: bool
 ) -> dict[str, Any] | None:
     """What the fields of a `Spec` are but those of the whole file; None with a finding."""
-    f, B, machine = system.get("f"), system.get("B"), entries.get("hardware")
-    drift, inputs = read_dynamics(f, B, names)
+    f, machine = system.get("f"), entries.get("hardware")
+    dynamics = read_dynamics(f, system.get("B"), names)
     found = FILE.values(entries, names)
     sound, box, metric = FILE.holds(found, entries), found.get("safe_set"), found.pop("metric", None)
     uncertainty = read_uncertainty(entries.get("uncertainty"), machine, names)
     trajectory = entries.get("trajectory")
-    known = drift and f and known_of(f, drift, names)
-    gain = [known_of(B, row, names) for row in inputs] if inputs and B else []
-    sure = tuple(row for row in gain if row is not None)
     plant = None
-    if known and box and len(sure) == len(names.states):
-        plant = Plant(names.states, names.inputs, known, sure, box)
+    if box and dynamics and dynamics.f and dynamics.B:
+        plant = Plant(names.states, names.inputs, dynamics.f, dynamics.B, box)
     plan = read_trajectory(trajectory, names, plant) if trajectory else None
     start = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
     x0 = start.x0
@@ -283,8 +279,8 @@ def _read_named(
     plan = completed(plan, x0) if plan else None
     limits = limits_of(entries.get("limits"), machine)
     found |= {
-        "f": known,
-        "B": sure if len(sure) == len(names.states) else None,
+        "f": dynamics and dynamics.f,
+        "B": dynamics and dynamics.B,
         "units": read_units(system.get("units"), names),
         "uncertainty": uncertainty,
         "trajectory": plan,
@@ -293,15 +289,16 @@ def _read_named(
     }
     expect = read_expectation(entries.get("expect"), names, alone=alone)
     simulation = read_simulation(entries.get("simulation"), plan, names)
-    if f is not None and drift is not None and plan is not None:
-        waves = (*drift, *((uncertainty and uncertainty.h) or ()))
-        _check_moving(f, drift, _beside_moving(plan, metric, waves, machine=machine is not None))
-    if reader.findings or not sound or drift is None or inputs is None or None in found.values():
+    if f is not None and dynamics is not None and plan is not None:
+        waves = (*dynamics.drift, *((uncertainty and uncertainty.h) or ()))
+        _check_moving(f, dynamics.drift, _beside_moving(plan, metric, waves, machine=machine is not None))
+    if reader.findings or not sound or dynamics is None or None in found.values():
         return None
+    entries_of_B = [term.expression for row in dynamics.gained for term in row]
     decides = CONDITIONS.sound(CONDITIONS.entries(entries.get("conditions")), names) or {}
     return found | {
-        "drift": drift if names.ranges else (),
-        "gained": inputs if is_uncertain(inputs, names) else (),
+        "drift": dynamics.drift if names.ranges else (),
+        "gained": dynamics.gained if free_symbols(entries_of_B) & set(dict(names.ranges)) else (),
         "within": start.within,
         "start_box": start.box,
         "metric": metric if isinstance(metric, Metric) else None,

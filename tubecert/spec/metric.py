@@ -152,7 +152,7 @@ def _bounds(field: Field, names: Names) -> Ends | None:
 
 def _dual(field: Field, names: Names) -> TermMatrix | None:
     n = len(names.states)
-    dual = field.term_matrix(n, n, names.of_state())
+    dual = field.term_matrix(n, n, names.scope("metric"))
     return dual if dual is not None and _symmetric(field, dual) else None
 
 

@@ -15,10 +15,11 @@ from tubecert.findings import Finding
 from tubecert.spec import codes, metric
 from tubecert.spec.coefficients import is_of_coefficients, metric_text
 from tubecert.spec.document import compose
+from tubecert.spec.metric import Metric
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field, Reader, is_of_another_kind, root_field
 from tubecert.spec.source import METRIC, Source, check_limits, read_source
-from tubecert.spec.types import Metric, Spec
+from tubecert.spec.types import Spec
 
 FORMAT: Final = "tubecert-metric/1"
 

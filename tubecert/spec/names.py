@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final
+from typing import Final, Literal
 
 from tubecert.expression import (
     MAX_NAME_LENGTH,
@@ -56,6 +56,18 @@ _RESERVED: Final = frozenset(
 )
 
 
+Use = Literal["metric", "plant", "drift", "uncertainty", "definition", "plan"]
+_MAY: Final[Mapping[Use, tuple[bool, bool, bool, bool, bool]]] = {
+    # the state, parameters of which a range is known, time; abs and norm; tables
+    "metric": (True, False, False, False, False),  # and E
+    "plant": (True, True, False, False, True),  # B
+    "drift": (True, True, True, False, True),  # f
+    "uncertainty": (True, False, True, True, True),
+    "definition": (True, True, True, True, True),  # whatever any of the others may
+    "plan": (False, False, True, False, True),
+}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
     """The names of a system, the values of its parameters, and what its definitions stand for.
@@ -83,32 +95,10 @@ class Names:
         """The parameters by name."""
         return {name: constant(value) for name, value in self.parameters} | dict(self.irrational)
 
-    def of_state(self) -> Scope:
-        """For the dual metric and E: states and parameters."""
-        return self._scope(*self.states, tables=False)
-
-    def of_plant(self) -> Scope:
-        """For B: the same as for E, tables, and parameters of which a range is known."""
-        return self._scope(*self.states, *dict(self.ranges))
-
-    def of_drift(self) -> Scope:
-        """For f: the same as for B, and time."""
-        return self._scope(*self.states, *dict(self.ranges), TIME)
-
-    def of_uncertainty(self) -> Scope:
-        """For h: states, time and parameters; abs and norm are allowed."""
-        return self._scope(*self.states, TIME, kinks=True)
-
-    def of_definition(self) -> Scope:
-        """For a definition: whatever any expression may use."""
-        return self._scope(*self.states, *dict(self.ranges), TIME, kinks=True)
-
-    def of_plan(self) -> Scope:
-        """For a trajectory: time and parameters."""
-        return self._scope(TIME)
-
-    def _scope(self, *variables: str, kinks: bool = False, tables: bool = True) -> Scope:
-        """Parameters, variables, and the definitions that stand for expressions of these."""
+    def scope(self, use: Use) -> Scope:
+        """What an expression may contain for its use."""
+        of_state, of_range, of_time, kinks, tables = _MAY[use]
+        variables = [*self.states * of_state, *list(dict(self.ranges)) * of_range, *[TIME] * of_time]
         symbols = self.values | {name: symbol(name) for name in variables}
         refused = {name: why for name, why in self._refused(variables) if name not in variables}
         if not tables:
@@ -311,7 +301,7 @@ def _with_definitions(names: Names, field: Field | None, taken: dict[str, str]) 
     found = list(_new_names(field, "of names to expressions", "definition", taken))
     for i, (name, entry, _) in enumerate(found):
         later = [other for _, _, other in found[i + 1 :]]
-        scope = names.of_definition()
+        scope = names.scope("definition")
         refused = {
             word: f"{word} is defined further down; a definition may use those above it" for word in later
         }
@@ -345,7 +335,7 @@ def _with_outputs(names: Names, field: Field | None, taken: dict[str, str]) -> N
     example = f"{names.states[-1]} - 0.5*{names.states[0]}"
     purpose = "of names to linear combinations of states"
     for name, entry, written in _new_names(field, purpose, "output", taken, "tip: x + 0.5*y"):
-        term = entry.term(names.of_state())
+        term = entry.term(names.scope("metric"))
         output = None if term is None else _linear(written, term, names)
         if term is not None and output is None:
             message = f"{entry.path} is not a sum of states times rational numbers"

@@ -226,9 +226,9 @@ class Formulas:
 
     kind = _kind("expressions")
     """A curve as expressions of t."""
-    x = entry(expressions("states", "of_plan"), needed=True, example=["sin(t)", "cos(t)"])
+    x = entry(expressions("states", "plan"), needed=True, example=["sin(t)", "cos(t)"])
     """x*(t), one expression of t per state."""
-    u = entry(expressions("inputs", "of_plan"), needed=True, example=["0"])
+    u = entry(expressions("inputs", "plan"), needed=True, example=["0"])
     """u*(t), one expression of t per input."""
     horizon = _horizon(needed=True)
     """How long the plan is followed, in s; > 0. The certificate claims [0, horizon]."""

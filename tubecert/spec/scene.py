@@ -224,7 +224,7 @@ class Simulation:
     """Seed of the random runs; a whole number."""
     plane: tuple[str, str] | None = key(Kind(_read_plane, _PLANE), None)
     """The two states that are drawn."""
-    h: tuple[Term, ...] | None = key(expressions("inputs", "of_uncertainty"), None)
+    h: tuple[Term, ...] | None = key(expressions("inputs", "uncertainty"), None)
     """The uncertainty to simulate, one expression of t and the states per input; by default the one of
     `uncertainty`."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from tubecert.expression import (
     MAX_NAME_LENGTH,
@@ -13,7 +13,6 @@ from tubecert.expression import (
     Expression,
     Lookup,
     constant,
-    free_symbols,
     number_text,
     root_above,
     substitute,
@@ -129,19 +128,29 @@ def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]
     return tuple(units)
 
 
-def read_dynamics(
-    f: Field | None, B: Field | None, names: Names
-) -> tuple[tuple[Term, ...] | None, TermMatrix | None]:
-    """The drift f, of n entries, and the input matrix B, n x m; both may contain parameters known by a range."""
+class Dynamics(NamedTuple):
+    """The drift f (n) and the input matrix B (n, m): the plant's, and what the controller knows of them."""
+
+    drift: tuple[Term, ...]
+    gained: TermMatrix
+    f: tuple[Term, ...] | None
+    B: TermMatrix | None
+
+
+def read_dynamics(f: Field | None, B: Field | None, names: Names) -> Dynamics | None:
+    """Both, with parameters known by a range; what is known is None where it is not defined."""
     n, m = len(names.states), len(names.inputs)
-    drift = f.terms(n, names.of_drift(), "expressions, one per state") if f else None
-    inputs = B.term_matrix(n, m, names.of_plant()) if B else None
-    if inputs is not None and B is not None and not _independent(B, inputs):
-        inputs = None
-    return (None, None) if drift is None or inputs is None else (drift, inputs)
+    drift = f.terms(n, names.scope("drift"), "expressions, one per state") if f else None
+    gained = B.term_matrix(n, m, names.scope("plant")) if B else None
+    if gained is not None and B is not None and not _independent(B, gained):
+        gained = None
+    if f is None or B is None or drift is None or gained is None:
+        return None
+    known, rows = _known(f, drift, names), [_known(B, row, names) for row in gained]
+    return Dynamics(drift, gained, known, whole(rows, n))
 
 
-def known_of(field: Field, terms: tuple[Term, ...], names: Names) -> tuple[Term, ...] | None:
+def _known(field: Field, terms: tuple[Term, ...], names: Names) -> tuple[Term, ...] | None:
     """What the controller knows: `terms` of f or B where every parameter known by a range is in its middle."""
     middle = {name: constant((low + high) / 2) for name, (low, high) in names.ranges}
     if not middle:
@@ -160,11 +169,6 @@ def _put(term: Term, values: Mapping[str, Expression]) -> Term:
     own, *owed = substitute([term.expression, *(duty.argument for duty in term.obligations)], values)
     duties = (replace(duty, argument=argument) for duty, argument in zip(term.obligations, owed, strict=True))
     return replace(term, expression=own, obligations=tuple(duties))
-
-
-def is_uncertain(matrix: TermMatrix, names: Names) -> bool:
-    """Whether a parameter that is known by a range stands in a matrix."""
-    return bool(free_symbols(term.expression for row in matrix for term in row) & set(dict(names.ranges)))
 
 
 def _independent(field: Field, matrix: TermMatrix) -> bool:
@@ -213,7 +217,7 @@ class Uncertainty:
     """
 
     h: tuple[Term, ...] | None = key(
-        expressions("inputs", "of_uncertainty"), None, example=["0.1*sin(2*t) + 0.01*abs(v)"]
+        expressions("inputs", "uncertainty"), None, example=["0.1*sin(2*t) + 0.01*abs(v)"]
     )
     """h(t, x), one expression of t, states and parameters per input; may use abs and norm."""
     bounds: Bounds | None = key(keys.inside(BOUNDS), None, late=True)
@@ -315,7 +319,7 @@ def _shape(field: Field, names: Names) -> TermMatrix | None:
         return None
     if width > MAX_COLUMNS:
         return field.fail(codes.LIMIT, f"{field.path} has {width} columns; at most {MAX_COLUMNS} are read")
-    return field.term_matrix(len(names.states), width, names.of_state())
+    return field.term_matrix(len(names.states), width, names.scope("metric"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

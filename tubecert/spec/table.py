@@ -20,8 +20,8 @@ from typing import Final
 from tubecert.expression import suggestion
 from tubecert.findings import capped
 from tubecert.spec import codes, keys
-from tubecert.spec.interpolation import DIGITS, rounded
 from tubecert.spec.keys import key, section
+from tubecert.spec.lookup import DIGITS, rounded
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field, whole
 from tubecert.spec.scope import MODERATE, out_of_range

@@ -7,31 +7,20 @@ from fractions import Fraction
 
 from tubecert.expression import Lookup
 from tubecert.findings import Location
-from tubecert.spec.machine import Arithmetic, Controller, Hardware, Hold
+from tubecert.spec.machine import Controller, Hardware
 from tubecert.spec.metric import Metric, Synthesis
-from tubecert.spec.plan import Afterwards, Bundle, PlanKind, Task, Trajectory
+from tubecert.spec.plan import Trajectory
 from tubecert.spec.scene import Obstacle, Simulation
-from tubecert.spec.system import Bounds, Disturbance, Uncertainty
+from tubecert.spec.system import Disturbance, Uncertainty
 from tubecert.spec.tube import Adaptation, Expectation, Tube
 from tubecert.spec.values import (
     Ends,
-    Interpolation,
-    Knots,
-    Matrix,
     Output,
     Places,
-    Table,
     Term,
     TermMatrix,
     Vector,
 )
-
-__all__ = [
-    "Adaptation", "Afterwards", "Arithmetic", "Bounds", "Bundle", "Controller", "Disturbance",
-    "Expectation", "Hardware", "Hold", "Interpolation", "Knots", "Matrix", "Metric", "Obstacle", "Output",
-    "Places", "PlanKind", "Simulation", "Spec", "Synthesis", "Table", "Task", "Term", "TermMatrix",
-    "Trajectory", "Tube", "Uncertainty", "Vector",
-]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,8 +22,7 @@ from tubecert.errors import TubecertError
 from tubecert.findings import Finding
 from tubecert.model import TIME, ControlAffineModel
 from tubecert.simulation.plans import Steering, integrated, waves
-from tubecert.spec import Knots, Spec
-from tubecert.spec.types import Bundle
+from tubecert.spec import Bundle, Knots, Spec
 from tubecert.trajectory import Plan
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
 

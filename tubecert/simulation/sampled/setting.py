@@ -19,8 +19,7 @@ from tubecert.sampled_loop.record import Result, Tables
 from tubecert.sampled_loop.remainders import Remainders, Sizes
 from tubecert.sampled_loop.setting import Loop, Size, driven
 from tubecert.simulation.plans import Steering, integrated, waves
-from tubecert.spec import Spec
-from tubecert.spec.types import Bundle
+from tubecert.spec import Bundle, Spec
 from tubecert.trajectory.make import plan_of
 
 Integers = NDArray[np.int64]
