@@ -299,8 +299,8 @@ class Judge:
         """What the reader accepts, the schema does; and the canonical form is the same specification."""
         import yaml
 
-        from tubecert.certificate.effective import as_file
         from tubecert.spec import canonical, load_text
+        from tubecert.spec.canonical import as_file
 
         data = canonical(spec)
         if spec.trajectory.table is None:

@@ -13,7 +13,6 @@ import pytest
 import yaml
 from texts import ROOT
 
-from tubecert.certificate.effective import as_file
 from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
 from tubecert.expression import RESERVED, free_symbols, to_text
 from tubecert.findings import Finding
@@ -21,6 +20,7 @@ from tubecert.recheck.document import Node
 from tubecert.recheck.specification import read_specification
 from tubecert.recheck.system import system_of
 from tubecert.spec import canonical, codes, load, load_question, load_text
+from tubecert.spec.canonical import as_file
 
 OK = sorted((ROOT / "tests/specs/ok").glob("*.yaml"))
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))

@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from tubecert.records import OPEN, FormError, Json, foreign, from_json
+from tubecert.spec.canonical import as_file
 
 T = TypeVar("T")
 Tree = Any  # texts, lists and mappings of them, as canonical data holds
@@ -173,12 +174,6 @@ class Effective(View):
         """The views of canonical data; raises `FormError`."""
         view = from_json(View, data, path)
         return cls(data=data, **{item.name: getattr(view, item.name) for item in fields(view)})
-
-
-def as_file(data: Mapping[str, Tree]) -> dict[str, Tree]:
-    """Canonical data as a file: that the tube is a ball goes without saying in the one, in the other it may not."""
-    ball = "tube" in data and "hardware" not in data and "coordinates" not in data["tube"]
-    return {**data, "tube": {**data["tube"], "coordinates": "identity"}} if ball else dict(data)
 
 
 def _mapping(value: Tree) -> Mapping[str, Tree]:

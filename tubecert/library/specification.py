@@ -12,13 +12,14 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from tubecert.asking import asker, named, text_of
-from tubecert.certificate.effective import Effective, as_file
+from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
 from tubecert.errors import SpecError
 from tubecert.findings import Finding, NamedPlace
 from tubecert.library import plain
 from tubecert.library.plain import Data, Plain
 from tubecert.spec import Setting, Spec, canonical
+from tubecert.spec.canonical import as_file
 from tubecert.spec.load import VERSION, Reads, again, load_source, whole
 from tubecert.spec.source import Source, read_source
 

@@ -15,6 +15,7 @@ from tubecert.claims.advice import MendPlan
 from tubecert.claims.family import Reason
 from tubecert.conditions.problem import TubeProblem
 from tubecert.kinds.table import KINDS, kind_of
+from tubecert.lint.codes import NOTABLE_DEFECT
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
@@ -29,8 +30,6 @@ from tubecert.stages.result import Explanation, Stage, result_of
 from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, find_tube, lay, radii, room_of
 from tubecert.trajectory.make import remedy
 from tubecert.verdict import Verdict
-
-NOTABLE = 0.02  # share of the tube that a plan's defect may take before it is worth a word
 
 
 def answer(question: Question) -> Stage | Stopped:
@@ -139,7 +138,7 @@ def _advised(judged: Judged, told: list[Reason]) -> list[Reason]:
     share = defect_share(judged.bounded.problem)
     if judged.bounded.enclosed.tube.plan.allowance is not None:
         return told  # nobody's plan: the specification allows its defect
-    if all(reason.verdict is Verdict.CERTIFIED for reason in told) or share < NOTABLE:
+    if all(reason.verdict is Verdict.CERTIFIED for reason in told) or share < NOTABLE_DEFECT:
         return told
     mend = mending(judged.bounded.enclosed)
     return [

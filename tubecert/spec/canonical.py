@@ -7,6 +7,7 @@ it loads to the same system. What a section says its keys write (`keys.Section.w
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 from tubecert.spec.load import FILE, VERSION
@@ -26,6 +27,12 @@ def canonical(spec: Spec) -> dict[str, Any]:
     if spec.lacks:  # then it is about a metric alone
         without |= {*_OF_LOOPS}
     return {name: own for name, own in data.items() if name not in without}
+
+
+def as_file(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Canonical data as a file: that the tube is a ball goes without saying in the one, in the other it may not."""
+    ball = "tube" in data and "hardware" not in data and "coordinates" not in data["tube"]
+    return {**data, "tube": {**data["tube"], "coordinates": "identity"}} if ball else dict(data)
 
 
 def synthesis_data(wanted: Synthesis) -> dict[str, Any]:
