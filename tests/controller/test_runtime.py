@@ -43,7 +43,7 @@ def shipped(folder, **options):
 
 def product(data, names, seen):
     """[left right] seen, exactly, and the sum of the sizes."""
-    rows = np.hstack([data.tables[name] for name in names])
+    rows = np.hstack([getattr(data.tables, name) for name in names])
     exact = [sum(Fraction(c) * v for c, v in zip(row, seen, strict=True)) for row in rows.tolist()]
     return exact, abs(rows) @ np.abs(np.array(seen, dtype=float))
 

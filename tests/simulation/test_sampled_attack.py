@@ -9,10 +9,10 @@ import pytest
 from loops import proven, setting
 from scipy.optimize import linprog
 
+from tubecert.controller.recursion import linear
 from tubecert.simulation.sampled import campaign
 from tubecert.simulation.sampled.attack import Attack, Lanes, goals, worst_of
 from tubecert.simulation.sampled.campaign import simulate
-from tubecert.simulation.sampled.loop import linear
 
 
 def followed(aims, size, rate):

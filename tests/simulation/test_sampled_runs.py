@@ -9,8 +9,9 @@ from loops import proven, setting
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from tubecert.controller.recursion import linear
 from tubecert.simulation.sampled.attack import Attack, Lanes
-from tubecert.simulation.sampled.loop import Run, linear
+from tubecert.simulation.sampled.loop import Run
 from tubecert.simulation.sampled.setting import course_of
 
 

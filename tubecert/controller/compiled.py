@@ -15,6 +15,7 @@ import numpy as np
 
 from tubecert.controller.data import Data, data_of
 from tubecert.controller.folder import files_of
+from tubecert.controller.recursion import Step
 from tubecert.enclosure.interval import Array
 from tubecert.errors import TubecertError
 from tubecert.findings import Finding
@@ -28,32 +29,32 @@ FLAGS: Final = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
 class Controller:
     """As many controllers side by side as there are `lanes`, before their first sample; each has a state of its own.
 
-    `state` is what the code keeps, an array of records (lanes,): `zeta` (z,), `delta` and `u` (m,), `k`, `bad`, `status`
-    (see controller.h).
+    `state` is what the code keeps, an array of records (lanes,): `zeta` (z,), `delta` and `u` (m,), `k`, `bad`,
+    `status` (see controller.h).
     Raises TC711 where there is no C compiler.
     """
 
     def __init__(self, data: Data, lanes: int = 1) -> None:
         self.data = data
         n, m, z = data.sizes
-        fields = [("zeta", data.real, (max(z, 1),)), ("delta", data.real, (m,)), ("u", data.real, (m,))]
+        numbers = [(name, data.real, (size,)) for name, size in (("zeta", max(z, 1)), ("delta", m), ("u", m))]
         counts = [(name, np.uint32) for name in ("k", "bad", "status")]
-        self.state = np.zeros(lanes, dtype=np.dtype([*fields, *counts], align=True))
-        self._shapes = ((lanes, n), *(((lanes, n), (lanes, m)) if data.plan.at is None else ()))
+        self.state = np.zeros(lanes, dtype=np.dtype([*numbers, *counts], align=True))
+        self._widths = (n, n, m) if data.plan.handed else (n,)
         self._step = _library(tuple(files_of(data).items())).controller_step_many
-        arrays = (ctypes.c_void_p,) * (len(self._shapes) + 1)
-        self._step.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *arrays)
+        self._step.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_void_p] * (len(self._widths) + 1))
         self._step.restype = None
 
     def step(self, y: Array, *plan: Array) -> Array:
         """The inputs (lanes, m) for what is measured, (lanes, n).
 
-        Of a family x* at this sample (lanes, n) and u* as it is held (lanes, m) are given as well, and only there.
+        Of a family x* at this sample (lanes, n) and u* as it is held (lanes, m) are given as well; else not used.
         """
-        pairs = zip((y, *plan), self._shapes, strict=True)
-        own = [np.ascontiguousarray(np.broadcast_to(each, shape), self.data.real) for each, shape in pairs]
-        u = np.empty_like(self.state["delta"], order="C")
-        self._step(*(self.state.ctypes.data, len(u)), *(each.ctypes.data for each in (*own, u)))
+        pairs = zip((y, *plan), self._widths, strict=False)
+        shaped = ((each, (len(self.state), width)) for each, width in pairs)
+        own = [np.ascontiguousarray(np.broadcast_to(*pair), self.data.real) for pair in shaped]
+        u = np.empty_like(self.state["u"], order="C")
+        self._step(self.state.ctypes.data, len(u), *(each.ctypes.data for each in (*own, u)))
         return u.astype(float)
 
 
@@ -84,7 +85,7 @@ def _failed(message: str) -> TubecertError:
     return TubecertError([Finding(code="TC711", message=message, help=help)])
 
 
-def stepper(certificate: Certificate) -> Callable[[int], Callable[..., Array]] | None:
+def stepper(certificate: Certificate) -> Callable[[int], Step] | None:
     """By the number of lanes, the exported code as a step of lanes that are last; None without code or compiler."""
     try:
         data = data_of(certificate)
@@ -92,8 +93,8 @@ def stepper(certificate: Certificate) -> Callable[[int], Callable[..., Array]] |
     except TubecertError:
         return None
 
-    def made(lanes: int) -> Callable[..., Array]:
-        code, handed = Controller(data, lanes), data.plan.at is None
-        return lambda y, x, u: code.step(y.T, *((x.T, u.T) if handed else ())).T
+    def made(lanes: int) -> Step:
+        code = Controller(data, lanes)
+        return lambda y, x, u: code.step(y.T, x.T, u.T).T
 
     return made

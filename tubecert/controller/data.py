@@ -6,8 +6,7 @@ controller computes in, rounded to the side on which nothing that is proven is c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from string import Template
@@ -15,9 +14,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from tubecert.controller.plans import Planned, planned, question, refused
-from tubecert.enclosure.interval import Array
-from tubecert.sampled_loop.record import Certificate
+from tubecert.controller.plans import Planned, question, refused
+from tubecert.sampled_loop.record import Certificate, Tables
 from tubecert.verdict import Verdict
 
 HOME: Final = Path(__file__).parent
@@ -25,33 +23,40 @@ _OWN: Final = ("controller_data.h", "README.txt")
 _ROUNDING: Final = Fraction(1, 2**21)  # of |x| and a width: more than rounding makes of a sample
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Data:
-    """A controller: its plan and arrays by the names that they have in C; times in s.
+    """A controller with the `name` of its specification: its plan, `tables`, and `limits` by the names that C has.
 
-    `tables` as in `sampled_loop.record.Tables`; `limits`: `reach` (n,), how far from the plan a sample may lie,
-    `memory` (z,), `low` and `high` (m,).
+    `limits`: `reach` (n,), how far from the plan a sample may lie, `memory` (z,), `low` and `high` (m,), all `real`.
+    `sizes`: numbers of states, inputs, and states of the controller. `work`: multiply-adds of a sample; the tables have
+    as many numbers. `sample_time` and `delay` in s.
     """
 
-    name: str
-    hash: str
-    real: type[np.floating[Any]]
-    sample_time: Fraction
-    delay: Fraction
-    tables: Mapping[str, Array]
-    limits: Mapping[str, Array]
-    plan: Planned
-
-    @property
-    def sizes(self) -> tuple[int, int, int]:
-        """Numbers of states, inputs, and states of the controller."""
-        m, n = self.tables["N"].shape
-        return n, m, len(self.tables["F"])
-
-    @property
-    def work(self) -> int:
-        """Multiply-adds of a sample; the tables have as many numbers."""
-        return sum(table.size for table in self.tables.values())
+    def __init__(self, certificate: Certificate, tables: Tables) -> None:
+        result, (m, n), z = certificate.result, tables.N.shape, tables.size
+        spec = question(result)
+        machine, stages = spec.hardware, result.tube
+        assert machine is not None
+        self.name, self.hash, self.tables, self.plan = (
+            spec.name,
+            certificate.hash,
+            tables,
+            Planned(result, spec),
+        )
+        self.sizes, self.work, self.sample_time = (n, m, z), (z + m) * (z + n), machine.sample_time
+        self.delay, self.real = machine.delayed, np.float32 if machine.arithmetic == "single" else np.float64
+        noise = machine.noise if isinstance(machine.noise, tuple) else (machine.noise,) * n
+        off = [result.half_widths[name] + error for name, error in zip(spec.states, noise, strict=True)]
+        sizes = (max(map(abs, box)) for box in spec.safe_set)
+        ranges = {use.input: use.range for use in result.inputs}
+        limits = {
+            "reach": (1, [far + _ROUNDING * (far + size) for far, size in zip(off, sizes, strict=True)]),
+            "memory": (-1, [max(own) for own in zip(*(stage.memory for stage in stages), strict=True)]),
+            "low": (1, [ranges[name][0] for name in spec.inputs]),
+            "high": (-1, [ranges[name][1] for name in spec.inputs]),
+        }
+        self.limits = {
+            name: np.array([_next(q, side, self.real) for q in own]) for name, (side, own) in limits.items()
+        }
 
 
 def data_of(certificate: Certificate) -> Data:
@@ -63,30 +68,7 @@ def data_of(certificate: Certificate) -> Data:
         raise error
     if tables is None or not (tables.M.any() or tables.N.any()):
         raise refused("the certificate has no controller", "certify with `controller: auto`")
-    spec = question(result)
-    machine = spec.hardware
-    assert machine is not None
-    real: type[np.floating[Any]] = np.float32 if machine.arithmetic == "single" else np.float64
-    noise = machine.noise if isinstance(machine.noise, tuple) else (machine.noise,) * len(spec.states)
-    widths = (max(stage.half_widths[name] for stage in result.tube) for name in spec.states)
-    off = [(w + n, max(map(abs, box))) for w, n, box in zip(widths, noise, spec.safe_set, strict=True)]
-    ranges = {use.input: use.range for use in result.inputs}
-    limits = {
-        "reach": (1, [far + _ROUNDING * (far + size) for far, size in off]),
-        "memory": (-1, [max(own) for own in zip(*(stage.memory for stage in result.tube), strict=True)]),
-        "low": (1, [ranges[name][0] for name in spec.inputs]),
-        "high": (-1, [ranges[name][1] for name in spec.inputs]),
-    }
-    return Data(
-        name=spec.name,
-        hash=certificate.hash,
-        real=real,
-        sample_time=machine.sample_time,
-        delay=machine.delayed,
-        tables={name: getattr(tables, name) for name in "FGMN"},
-        limits={name: np.array([_next(q, side, real) for q in own]) for name, (side, own) in limits.items()},
-        plan=planned(result, spec, machine),
-    )
+    return Data(certificate, tables)
 
 
 def _next(q: Fraction, side: int, real: type[np.floating[Any]]) -> float:
@@ -100,16 +82,17 @@ def texts(data: Data) -> dict[str, str]:
     """The files that belong to the certificate, by their names."""
     (n, m, z), plan = data.sizes, data.plan
     over = f"after {plan.steps} samples: the last command is held from then on, and STATUS_END is told"
-    matrices = {**data.tables, "xs": plan.rows[0], "us": plan.rows[1]}
+    tables = ((name, getattr(data.tables, name)) for name in "FGMN")
+    matrices = [*tables, *zip(("xs", "us"), plan.rows, strict=True)]
     places: dict[str, object] = {
-        **{name: "{" + ",\n".join(map(_row, own.tolist() or [[]])) + "}" for name, own in matrices.items()},
+        **{name: "{" + ",\n".join(map(_row, own.tolist() or [[]])) + "}" for name, own in matrices},
         **{name: _row(own.tolist()) for name, own in data.limits.items()},
         **{"name": data.name, "hash": data.hash, "n": n, "m": m, "z": z, "work": data.work},
         **{"period": float(data.sample_time), "delay": float(data.delay), "lead": float(plan.lead)},
         **{"kind": plan.kind, "steps": plan.steps, "after": plan.after, "rows": len(plan.rows[0])},
         **{"formula_x": plan.formula[0], "formula_u": plan.formula[1]},
         "real": "float" if data.real is np.float32 else "double",
-        "handed": "xs, us, " if plan.at is None else "",
+        "handed": "xs, us, " if plan.handed else "",
         "end": over if plan.after == plan.steps else "never",
     }
     return {name: Template((HOME / f"{name}.in").read_text("utf-8")).substitute(places) for name in _OWN}

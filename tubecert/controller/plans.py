@@ -10,8 +10,7 @@ from __future__ import annotations
 import ast
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, Final
 
@@ -23,34 +22,15 @@ from tubecert.expression import FUNCTIONS
 from tubecert.findings import Finding
 from tubecert.model import build
 from tubecert.sampled_loop.record import Result
-from tubecert.spec import Hardware, Spec, load_text
+from tubecert.spec import Spec, load_text
 from tubecert.trajectory.hermite import intervals
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import PiecewisePlan, piecewise_plan
-from tubecert.trajectory.plan import Plan
 
 _FOR_EVER: Final = 2**30  # samples of a formula: up to there its time in double is that of the sample
 _EVERY: Final = 4096  # of them one in the self-test: as in selftest.c
 _MOST_ROWS: Final = 1_000_000
 _SIGNS: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-
-
-@dataclass(frozen=True, slots=True)
-class Planned:
-    """The plan of a computer: `kind` is the macro of the C code.
-
-    After `steps` samples sample `after` is next: `steps` itself is the end. `lead`, s: from a sample to the u* that is
-    held for it. `at` is the plan of some samples, (N, n) and (N, m), None where it is handed in; `rows` is that of all
-    samples, of a formula that of some, of a family 0. `formula`: lines of C that set xs, and those for us.
-    """
-
-    kind: str
-    steps: int
-    after: int
-    lead: Fraction
-    rows: tuple[Array, Array]
-    at: Callable[[Sequence[int]], tuple[Array, Array]] | None
-    formula: tuple[str, str] = ("", "")
 
 
 def refused(message: str, help: str = "") -> TubecertError:
@@ -60,62 +40,60 @@ def refused(message: str, help: str = "") -> TubecertError:
 
 def question(result: Result) -> Spec:
     """The specification of a certificate; at rest where the plan is a curve through knots."""
-    effective = result.spec.effective
-    if result.planned is None:
-        return load_text(effective.text, "certificate")
-    unused = ("initial_state", "obstacles", "simulation", "expect", "tube")
-    return load_text(effective.at_rest(unused), "certificate")
+    effective, unused = result.spec.effective, ("initial_state", "obstacles", "simulation", "expect", "tube")
+    return load_text(effective.text if result.planned is None else effective.at_rest(unused), "certificate")
 
 
-def planned(result: Result, spec: Spec, hardware: Hardware) -> Planned:
-    """What the computer of a certificate knows of its plan. Raises TC710 for a plan that cannot be written down."""
-    horizon, afterwards = spec.trajectory.horizon, result.claim.afterwards
-    period, goes_on = hardware.sample_time, spec.trajectory.kind == "expressions" and afterwards == "repeat"
-    lead = hardware.delayed + (period / 2 if result.claim.hold == "middle" else 0)
-    steps, after = 1, 0
-    if goes_on:
-        steps = after = _FOR_EVER
-    elif horizon is not None:
-        steps = math.ceil(horizon / period) + (afterwards == "rest")
-        after = {"nothing": steps, "rest": steps - 1, "repeat": 0}[afterwards]
-    if spec.trajectory.bundle is not None:
-        rows = np.zeros((1, len(spec.states))), np.zeros((1, len(spec.inputs)))
-        return Planned("PLAN_HANDED", steps, after, lead, rows, None)
-    if not goes_on and steps > _MOST_ROWS:
-        message = f"the plan has {steps:,} samples; a table has at most {_MOST_ROWS:,}"
-        raise refused(message, "certify a shorter plan")
-    plan = _plan(result, spec)
+class Planned:
+    """The plan of a certificate's computer: `kind` is the macro of the C code; `handed`: a planner hands it in.
 
-    def during(t: Fraction) -> Fraction:
-        if goes_on or horizon is None:
-            return t
-        return t % horizon if afterwards == "repeat" else min(t, horizon)
+    After `steps` samples sample `after` is next: `steps` itself is the end. `lead`, s: from a sample to the u* that is
+    held for it. `rows` (N, n) and (N, m) are those of all samples, of a formula those of some, of a family 0.
+    `formula`: lines of C that set xs, and those for us. Raises TC710 for a plan that cannot be written down.
+    """
 
-    def at(samples: Sequence[int]) -> tuple[Array, Array]:
-        now, then = ([during(k * period + later) for k in samples] for later in (Fraction(0), lead))
-        return _values(plan, now)[0], _values(plan, then)[1]
+    def __init__(self, result: Result, spec: Spec) -> None:
+        own, machine, afterwards = spec.trajectory, spec.hardware, result.claim.afterwards
+        assert machine is not None
+        goes_on, self.handed = own.kind == "expressions" and afterwards == "repeat", own.bundle is not None
+        self._period, self._end, self._again = machine.sample_time, own.horizon, afterwards == "repeat"
+        self.lead = machine.delayed + (self._period / 2 if result.claim.hold == "middle" else 0)
+        self.kind, self.steps, self.after, self.formula = "PLAN_TABLE", 1, 0, ("", "")
+        if goes_on:
+            texts = result.spec.effective.part("trajectory")
+            self.kind, self.steps, self.after, self._end = "PLAN_FORMULA", _FOR_EVER, _FOR_EVER, None
+            self.formula = _formula("xs", texts["x"]), _formula("us", texts["u"])
+        elif own.horizon is not None:
+            self.steps = math.ceil(own.horizon / self._period) + (afterwards == "rest")
+            self.after = {"nothing": self.steps, "rest": self.steps - 1, "repeat": 0}[afterwards]
+        if self.handed:
+            self.kind = "PLAN_HANDED"
+            self.rows = np.zeros((1, len(spec.states))), np.zeros((1, len(spec.inputs)))
+            return
+        if self.steps > _MOST_ROWS and not goes_on:
+            message = f"the plan has {self.steps:,} samples; a table has at most {_MOST_ROWS:,}"
+            raise refused(message, "certify a shorter plan")
+        model, knots = build(spec), result.planned
+        self._plan = plan_of(spec, model) if knots is None else piecewise_plan(model, knots, own.horizon)
+        self.rows = self.at(range(0, 16 * _EVERY, _EVERY) if goes_on else range(self.steps))
 
-    if goes_on:
-        rows = at(range(0, 16 * _EVERY, _EVERY))
-        own = result.spec.effective.part("trajectory")
-        formula = _formula("xs", own["x"]), _formula("us", own["u"])
-        return Planned("PLAN_FORMULA", steps, after, lead, rows, at, formula)
-    return Planned("PLAN_TABLE", steps, after, lead, at(range(steps)), at)
+    def at(self, samples: Sequence[int]) -> tuple[Array, Array]:
+        """x* (N, n) at samples, and u* (N, m) as it is held for them."""
+        now, then = ([k * self._period + later for k in samples] for later in (0, self.lead))
+        return self._values(now)[0], self._values(then)[1]
 
-
-def _plan(result: Result, spec: Spec) -> Plan:
-    model, knots = build(spec), result.planned
-    return plan_of(spec, model) if knots is None else piecewise_plan(model, knots, spec.trajectory.horizon)
-
-
-def _values(plan: Plan, times: Sequence[Fraction]) -> tuple[Array, Array]:
-    """x* (N, n) and u* (N, m) at exact times; where u* jumps, what it jumps to."""
-    window, span = intervals(times), None
-    if isinstance(plan, PiecewisePlan) and plan.spans is not None:
-        last = len(plan.pieces) - 1
-        span = np.array([min(bisect_right(plan.data.t, t) - 1, last) for t in times], dtype=float)
-    x, u = plan.enclose(window.lo, window.hi, span)
-    return x.mid.astype(np.float32).astype(float), u.mid.astype(np.float32).astype(float)
+    def _values(self, times: Sequence[Fraction]) -> tuple[Array, Array]:
+        """x* and u* at exact times; where u* jumps, what it jumps to."""
+        if (end := self._end) is not None:
+            times = [t % end if self._again else min(t, end) for t in times]
+        window, span, plan = intervals(times), None, self._plan
+        if isinstance(plan, PiecewisePlan) and plan.spans is not None:
+            last = len(plan.pieces) - 1
+            span = np.array([min(bisect_right(plan.data.t, t) - 1, last) for t in times], dtype=float)
+        x, u = (
+            side.mid.astype(np.float32).astype(float) for side in plan.enclose(window.lo, window.hi, span)
+        )
+        return x, u
 
 
 def _formula(names: str, texts: Any) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 
@@ -12,8 +13,23 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from tubecert.controller.data import Data
+    from tubecert.sampled_loop.record import Tables
 
+Step: TypeAlias = Callable[[Array, Array, Array], Array]
+"""Inputs (m, N) for measurements y (n, N), the plan's x* (n, N or 1) now and its u* (m, N or 1) when they act."""
 _ON_TIME: Final = 1e-6  # of a sample time
+
+
+def linear(tables: Tables, lanes: int = 1) -> Step:
+    """The recursion of N lanes: delta = M zeta + N dy, zeta+ = F zeta + G dy (theory of the sampled loop, 1.4)."""
+    zeta = np.zeros((tables.size, lanes))
+
+    def step(y: Array, x: Array, u: Array) -> Array:
+        delta = tables.M @ zeta + tables.N @ (y - x)
+        zeta[...] = tables.F @ zeta + tables.G @ (y - x)
+        return np.asarray(u + delta)
+
+    return step
 
 
 class SampledController:
@@ -23,9 +39,8 @@ class SampledController:
     """
 
     def __init__(self, data: Data) -> None:
-        self.sample_time, self.samples = float(data.sample_time), 0
-        self._plan, self._tables, self._row = data.plan, data.tables, 0
-        self._zeta = np.zeros(data.sizes[2])
+        self.sample_time, self.samples, self._row = float(data.sample_time), 0, 0
+        self._plan, self._step = data.plan, linear(data.tables)
 
     def __call__(
         self, t: float, y: ArrayLike, x: ArrayLike | None = None, u: ArrayLike | None = None
@@ -35,21 +50,18 @@ class SampledController:
         Of a family the plan comes with every sample: x* at t (n,), and u* (m,) as it is held while the input acts.
         Raises `ValueError` if t is not the time of the next sample, if y is no state, if a plan is missing, or is over.
         """
-        plan, tables = self._plan, self._tables
+        plan = self._plan
         if abs(t / self.sample_time - self.samples) > _ON_TIME * (1 + self.samples):
             raise ValueError(f"the next sample is at t = {self.samples * self.sample_time} s")
-        if (plan.at is None) is (x is None or u is None):
+        if plan.handed is (x is None or u is None):
             raise ValueError("x and u are given for a family of plans, and only there")
         if self._row >= plan.steps:
             raise ValueError("the plan is over, and nothing is proven for later")
-        given = (x, u) if plan.at is None else plan.at([self._row])
+        given = (x, u) if plan.handed else plan.at([self._row])
         planned, held = (np.ravel(np.asarray(each, float)) for each in given)
         measured = np.asarray(y, float)
         if measured.shape != planned.shape:
             raise ValueError(f"y has {measured.size} numbers, the state has {planned.size}")
-        off = measured - planned
-        command = held + tables["M"] @ self._zeta + tables["N"] @ off
-        self._zeta = tables["F"] @ self._zeta + tables["G"] @ off
         self.samples += 1
         self._row = self._row + 1 if self._row + 1 < plan.steps else plan.after
-        return np.asarray(command)
+        return self._step(measured[:, None], planned[:, None], held[:, None])[:, 0]

@@ -10,10 +10,11 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
+from tubecert.controller.recursion import linear
 from tubecert.executor import Serial
 from tubecert.progress import Progress
 from tubecert.simulation.sampled.attack import Attack, Flags, Lanes
-from tubecert.simulation.sampled.loop import DIVERGED, Controllers, Seen, joined, linear, resolved
+from tubecert.simulation.sampled.loop import DIVERGED, Controllers, Seen, joined, resolved
 from tubecert.simulation.sampled.setting import Setting
 from tubecert.simulation.vectors import finished, vectors_of
 from tubecert.verdict import Verdict

@@ -9,8 +9,8 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
+from tubecert.controller.recursion import Step
 from tubecert.enclosure.interval import Array
-from tubecert.sampled_loop.record import Tables
 from tubecert.simulation.obstacles import in_plane, signed_distance
 from tubecert.simulation.plans import integrated
 from tubecert.simulation.sampled.attack import Lanes
@@ -23,24 +23,7 @@ _DRAWN: Final = 16  # of how many runs one is
 _LIMIT: Final = 100  # shares of what is proven, beyond which nobody is followed
 NOBODYS, DIVERGED = -1, 1  # why a lane is stopped: its plan is none of its family, or it is far outside
 
-Step: TypeAlias = Callable[[Array, Array, Array], Array]
-"""Inputs (m, N) for measurements y (n, N), the plan's x* (n, N or 1) now and its u* (m, N or 1) when they act."""
 Controllers: TypeAlias = Callable[[int], Step]  # for so many lanes
-
-
-def linear(tables: Tables, lanes: int) -> Step:
-    """The tables in floats.
-
-    Implements: theory of the sampled loop, section 1: delta = M zeta + N dy, zeta+ = F zeta + G dy.
-    """
-    zeta = np.zeros((tables.size, lanes))
-
-    def step(y: Array, x: Array, u: Array) -> Array:
-        delta = tables.M @ zeta + tables.N @ (y - x)
-        zeta[...] = tables.F @ zeta + tables.G @ (y - x)
-        return np.asarray(u + delta)
-
-    return step
 
 
 class Seen(NamedTuple):
