@@ -101,9 +101,9 @@ def test_what_is_finished_stays_and_the_same_seed_says_the_same(monkeypatch):
     own = setting("scalar")
     whole, some = simulate(own, "h", runs=60, seed=1), simulate(own, "h", runs=60, seed=1, report=stop)
     assert (some.outcome, some.runs, told) == ("interrupted", 64, [0, 32, 64])
-    np.testing.assert_array_equal(whole.share[:, :64], some.share)
+    np.testing.assert_array_equal(whole.peaks["share"][:, :64], some.peaks["share"])
     assert whole.summary["states"]["x"]["random_by_stage"]
-    assert (simulate(own, "h", runs=60, seed=2).share[:, 60:] != whole.share[:, 60:]).any()
+    assert (simulate(own, "h", runs=60, seed=2).peaks["share"] != whole.peaks["share"])[:, 60:].any()
 
 
 @pytest.mark.slow

@@ -78,11 +78,8 @@ class Lanes:
         share, corner = np.split(parameters, 2)
         low, high = own.ranges.T[:, :, None]
         self.parameters = low + np.where(corner < 0.5, np.round(share), share) * (high - low)
-        aimed, random = (
-            self._known(self._sample)[-n:],
-            worst_of(2 * np.array(around).T - 1, start.length > 0).T,
-        )
-        towards = np.where(self.aimed & aimed.any(axis=0), aimed, random)
+        random, known = 2 * np.array(around).T - 1, self._known(self._sample)[-n:]
+        towards = np.where(self.aimed & known.any(axis=0), known, worst_of(random, start.length > 0).T)
         inside = np.where(self.aimed | (far < 0.5), 1.0, far)
         self.off = start.known.mid + inside * towards * (start.length or start.box[:, None])
         self.course = course_of(own, plan)
@@ -98,8 +95,8 @@ class Lanes:
         """
         own, slow, (noise, wind, last) = self.setting, self.setting.slow, self._draws
         later = np.arange(len(own.lengths)) / len(own.lengths)
-        drawn = [(noise, 0.0), *((wind, part) for part in later.tolist()), (last, 0.0)]
-        random = [waves(draws, own.samples, k + part) for draws, part in drawn]
+        times = [(noise, 0.0), *((wind, part) for part in later.tolist()), (last, 0.0)]
+        random = [waves(draws, own.samples, k + part) for draws, part in times]
         lag = self._sample - k if k < 0 else (self._sample - k) % (self._sample + 1)
         known = np.split(self._known(lag), np.cumsum([len(each) for each in random]))
         heard, *blown, goal = (np.where(self.aimed, *both) for both in zip(known, random, strict=False))

@@ -95,10 +95,11 @@ class Passed(NamedTuple):
 class Campaign:
     """What was `found` in `runs` of those that were `asked`, with the `controller` as exported C code or in floats.
 
-    `aimed` (N,): which were adversaries. `share` (n + m, N): the largest of every state, then of every input,
-    `by_stage` (2, n + m, G) of random runs and of adversaries in every stage that was reached, `attained` of any
-    half-width. `error`: the largest of an integration, as a share of a half-width. Where inputs `went`, how near
-    obstacles were `passed`; which runs were `outside` of the tube by more than their error and the plan's rounding.
+    `aimed` (N,): which were adversaries. `peaks`: of every state, then of every input, the largest `share`, (n + m, N),
+    its `value` of a `bound`, `when` in s; `by_stage` (2, n + m, G): of random runs and of adversaries in every stage
+    that was reached; `attained`: of any half-width. `error`: the largest of an integration, as a share of a half-width.
+    Where inputs `went`, how near obstacles were `passed`; which runs were `outside` of the tube by more than their
+    error and the plan's rounding.
     """
 
     def __init__(
@@ -106,13 +107,16 @@ class Campaign:
     ) -> None:
         self.attack, self.certificate, self.asked, self.controller = attack, certificate, asked, controller
         self.setting, self.found, self.runs = attack.setting, found, len(found.stopped)
-        own, (n, m), finite = (
-            self.setting,
-            self.setting.loop.B.shape,
-            np.nan_to_num,
-        )  # of what grew without end
+        own, (n, m), finite = self.setting, self.setting.loop.B.shape, np.nan_to_num
         self.aimed: Flags = np.arange(self.runs) < len(attack.aims)
-        self.share, into, ends = np.split(found.most, [n + m, len(found.most) - 2 * m])
+        share, into, ends = np.split(found.most, [n + m, len(found.most) - 2 * m])
+        bound = np.take_along_axis(own.limits.T, found.node[: n + m], axis=1)
+        self.peaks = {
+            "share": share,
+            "value": share * bound,
+            "bound": bound,
+            "when": own.t[found.node[: n + m]],
+        }
         begun = own.stages[own.stages < own.samples]
         self.by_stage = finite(np.maximum.reduceat(found.profile, begun, axis=2))
         self.attained, self.error = float(self.by_stage[:, :n].max()), float(finite(found.error.max()))
@@ -133,7 +137,7 @@ class Campaign:
         room = np.concatenate([np.ones(n), gain])[:, None] * error
         most = max(max(abs(went.least), abs(went.greatest)) for went in self.went.values())
         room[n:] += _SINGLE * most / inputs.min(axis=1)[:, None]
-        beyond = (self.share > 1 + _ROUNDING + room).any(axis=0) | (self.found.stopped == DIVERGED)
+        beyond = (self.peaks["share"] > 1 + _ROUNDING + room).any(axis=0) | (self.found.stopped == DIVERGED)
         return np.flatnonzero(beyond).tolist()
 
     @property
@@ -150,12 +154,10 @@ class Campaign:
         """Of a state or an input in some lanes (N,); None if there are none."""
         if not group.any():
             return None
-        return self._peak(index, int(np.argmax(np.where(group, self.share[index], -1.0))))
+        return self._peak(index, int(np.argmax(np.where(group, self.peaks["share"][index], -1.0))))
 
     def _peak(self, index: int, number: int) -> Peak:
-        own, node, share = self.setting, self.found.node[index, number], self.share[index, number]
-        bound = own.limits[node, index]
-        return Peak(number, *map(float, (share, share * bound, bound, own.t[node])))
+        return Peak(number, *(float(own[index, number]) for own in self.peaks.values()))
 
     @property
     def violations(self) -> list[Violation]:
@@ -163,7 +165,7 @@ class Campaign:
         names, found = self.setting.names, []
         aims = [names[target] for target in self.attack.aims[:, 2]]
         for number in self.outside[:_LISTED]:
-            index = int(self.share[:, number].argmax())
+            index = int(self.peaks["share"][:, number].argmax())
             aimed = aims[number] if number < len(aims) else ""
             found.append(Violation(names[index], aimed, self._peak(index, number)))
         return found

@@ -22,11 +22,12 @@ _BOXES: Final = 400  # cross-sections of the tube that are drawn
 
 def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     """Beside its summary, figures only of what was not interrupted; the same campaign gives the same bytes."""
-    own, found, node = campaign.setting, campaign.found, campaign.found.node[: len(campaign.share)]
-    bound = own.limits[node, np.arange(len(node))[:, None]]
-    peaks = {"share": campaign.share, "when": own.t[node], "value": campaign.share * bound, "bound": bound}
-    lanes = {"error": found.error, "aimed": campaign.aimed, "names": np.array(own.names)}
-    yield "runs.npz", npz({**peaks, **lanes, "profile": found.profile})
+    lanes = {
+        "error": campaign.found.error,
+        "aimed": campaign.aimed,
+        "names": np.array(campaign.setting.names),
+    }
+    yield "runs.npz", npz({**campaign.peaks, **lanes, "profile": campaign.found.profile})
     if campaign.runs == campaign.asked:  # to draw takes longer than who is interrupted has
         yield from images(DRAWERS, campaign)
 

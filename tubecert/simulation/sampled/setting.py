@@ -94,11 +94,9 @@ def setting_of(spec: Spec, result: Result, duration: Fraction | None = None) -> 
 
 def _samples(loop: Loop, result: Result, duration: Fraction | None) -> int:
     Ts, horizon = loop.sample_time, result.claim.horizon
-    asked = duration or (loop.spec.simulation and loop.spec.simulation.duration)
-    if horizon is not None:
-        return ceil(min(asked or horizon, horizon) / Ts)
-    if asked:
-        return ceil(asked / Ts)
+    asked = duration or (loop.spec.simulation and loop.spec.simulation.duration) or horizon
+    if asked is not None:
+        return ceil((asked if horizon is None else min(asked, horizon)) / Ts)
     memory = _MEMORIES * result.recipe.lags if result.recipe else 0
     return min(_SAMPLES[1], max(_SAMPLES[0], ceil((loop.plan.horizon or 0) / Ts), memory))
 
