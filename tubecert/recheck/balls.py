@@ -42,15 +42,10 @@ def ceiling(x: arb) -> float:
     return math.inf if math.isnan(value) else math.nextafter(value, math.inf)
 
 
-def magnitude(x: arb) -> arb:
-    """The largest |x|, as an exact ball."""
-    return x.abs_upper()
-
-
 def square(x: arb) -> arb:
     """x^2, never negative."""
     if x.contains(0):
-        top = magnitude(x)
+        top = x.abs_upper()
         return between(0, top * top)
     found = x * x
     if found.contains(0):  # of a wide ball: a product of balls loses what is known of its sign
@@ -85,16 +80,6 @@ def root(x: arb) -> arb:
 def length(entries: Sequence[arb]) -> arb:
     """The Euclidean norm."""
     return root(sum((square(x) for x in entries), start=arb(0)))
-
-
-def larger(x: arb, y: arb) -> arb:
-    """The larger of two numbers."""
-    return x.max(y)
-
-
-def smaller(x: arb, y: arb) -> arb:
-    """The smaller of two numbers."""
-    return x.min(y)
 
 
 def pivots(a: Balls) -> list[arb]:
@@ -221,3 +206,44 @@ def whitening(a: list[list[float]]) -> list[list[float]]:
             rest = inverse[i][j] - sum(lower[i][k] * inverse[k][j] for k in range(i))
             inverse[i][j] = rest / lower[i][i]
     return inverse
+
+
+# -- matrices put together and taken apart
+
+
+def picked(rows: range, size: int) -> arb_mat:
+    """Rows of the unit matrix of a size."""
+    return arb_mat(len(rows), size, [int(i == j) for i in rows for j in range(size)])
+
+
+def column(entries: Sequence[arb]) -> arb_mat:
+    """A matrix of one column."""
+    return arb_mat(len(entries), 1, list(entries))
+
+
+def joined(blocks: Sequence[Sequence[arb_mat]]) -> arb_mat:
+    """A matrix of blocks: those of one row are equally high, those of one column equally wide."""
+    lines = [line for row in blocks for line in zip(*(block.tolist() for block in row), strict=True)]
+    width = sum(block.ncols() for block in blocks[0])
+    return arb_mat(len(lines), width, [x for line in lines for part in line for x in part])
+
+
+def stacked(parts: Sequence[arb_mat]) -> arb_mat:
+    """A matrix of all rows."""
+    return joined([[own] for own in parts])
+
+
+def parted(a: arb_mat, at: int) -> tuple[arb_mat, arb_mat]:
+    """The columns before one, and the others."""
+    left, right = ([x for row in a.tolist() for x in row[part]] for part in (slice(at), slice(at, None)))
+    return arb_mat(a.nrows(), at, left), arb_mat(a.nrows(), a.ncols() - at, right)
+
+
+def sizes(a: arb_mat) -> arb_mat:
+    """The entries' largest magnitudes."""
+    return arb_mat(a.nrows(), a.ncols(), [x.abs_upper() for x in a.entries()])
+
+
+def around_zero(a: arb_mat) -> arb_mat:
+    """Balls around 0 as large as the entries: r times such a column is a ball around 0 as large as |r| times it."""
+    return arb_mat(a.nrows(), a.ncols(), [arb(0, x.abs_upper()) for x in a.entries()])

@@ -25,7 +25,7 @@ from typing import Protocol, TypeAlias
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.balls import Ball, between, magnitude
+from tubecert.recheck.balls import Ball, between
 from tubecert.recheck.lookup import smooth_on
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
@@ -92,7 +92,7 @@ class Expansion:
         squares = [q.entries() for q in self.squares.values()]
         found = []
         for k, r in enumerate(self.rest):
-            size = sum((magnitude(e[k]) for e in sizes), start=r)
+            size = sum((e[k].abs_upper() for e in sizes), start=r)
             total = value[k] + between(-size, size)
             found.append(sum((between(0, q[k]) for q in squares), start=total))
         return found
@@ -284,14 +284,14 @@ class Field:
         for a, slope in enumerate(own[1 : 1 + curved] if second else varied):
             i = self._curved[a]
             step = [radius[i] * s for s in slope]
-            size = _weighed(weights, map(magnitude, step))
+            size = _weighed(weights, map(arb.abs_upper, step))
             spread[i] = max(spread[i], size)
             if self._steady and a < _CORNERS:
                 steps.append(_column(step))
                 if not second:  # the slope of a mean value form is a range
                     caused[i] += _weighed(weights, (s.rad() for s in step))
             else:
-                rest = [r + magnitude(s) for r, s in zip(rest, step, strict=True)]
+                rest = [r + s.abs_upper() for r, s in zip(rest, step, strict=True)]
                 caused[i] += size
         squares: dict[int, arb_mat] = {}
         mixed: dict[tuple[int, int], arb_mat] = {}
@@ -299,7 +299,7 @@ class Field:
         for (a, b), bent in zip(self._pairs, own[1 + curved :], strict=True):
             weight = self._weight((a, b), radius)
             bends = [weight * x for x in bent]
-            bend, near = [magnitude(q) for q in bends], _column(bends)
+            bend, near = [q.abs_upper() for q in bends], _column(bends)
             share: float = 1  # of what bends at the centre: it goes into the rest
             if a == b and a < len(steps) and 2 * vertices <= _VERTICES:
                 squares[a], share = near, 0
@@ -323,11 +323,11 @@ class Field:
         if self._order == 3:
             for triple, turning in zip(self._triples, varied, strict=True):
                 weight = self._weight(triple, radius)
-                yield triple, [magnitude(weight * x) for x in turning]
+                yield triple, [(weight * x).abs_upper() for x in turning]
         elif self._order == 2:
             for pair, near, far in zip(self._pairs, bent, varied, strict=True):
                 weight = self._weight(pair, radius)
-                yield pair, [magnitude(weight * (y - x)) for x, y in zip(near, far, strict=True)]
+                yield pair, [(weight * (y - x)).abs_upper() for x, y in zip(near, far, strict=True)]
 
     def _weight(self, key: tuple[int, ...], radius: list[Ball]) -> Ball:
         """Radii over factorials, as in Taylor's formula, for curved variables in ascending order."""

@@ -16,7 +16,7 @@ from fractions import Fraction
 
 from flint import arb
 
-from tubecert.recheck.balls import Ball, exact, larger, root, smaller
+from tubecert.recheck.balls import Ball, exact, root
 from tubecert.recheck.document import Node, reads
 from tubecert.recheck.system import System
 
@@ -39,12 +39,12 @@ def kappa(c: Ball, w: Ball) -> Ball:
 def tight_kernel(c: Ball, w: Ball, s0: Ball, s1: Ball) -> Ball:
     """J(c, w, s0, s1) (2.19)."""
     slow = s1 / (c * w)
-    room = smaller(c, w) * s0 - s1
+    room = c.min(w) * s0 - s1
     if room <= 0:
         return slow
     # what the initial value adds is 0 if room <= 0, else at most s0 kappa, and at most room/(c w): with p = w s0 - s1
     # it is q (q/p)^(c/(w-c)) <= q = room over c w if c < w, and q (p/q)^(c/(c-w)) <= p = room if c > w
-    most = smaller(s0 * kappa(c, w), larger(room, arb(0)) / (c * w))
+    most = (s0 * kappa(c, w)).min(room.max(arb(0)) / (c * w))
     always = slow.union(slow + most)
     q = c * s0 - s1
     if room > 0:
@@ -77,7 +77,7 @@ class Distance:
         start = self.d0 - A1
         D1 = self.omega - self.rate
         last = A1 if self.horizon is None else self.at(self.horizon)
-        ends = larger(self.d0, last)
+        ends = self.d0.max(last)
         if C1 <= 0 or self.rate * start >= C1:
             return ends
         z = start / C1
@@ -85,17 +85,17 @@ class Distance:
         if inside <= 0:
             return ends
         most = kappa(self.rate, self.omega)
-        weak = larger(self.d0, A1) + larger(C1, arb(0)) * most
+        weak = self.d0.max(A1) + C1.max(arb(0)) * most
         # without its last part D is monotone: at most d0, or what it is in the end without that part
-        weak = smaller(weak, ends + 2 * abs(C1) * most)
+        weak = weak.min(ends + 2 * abs(C1) * most)
         if not (inside > 0 and C1 > 0 and self.rate * start < C1):
-            return larger(ends, weak)
+            return ends.max(weak)
         t1 = log_ratio(D1 / self.rate) / self.rate - z * log_ratio(z * D1)
         if self.horizon is None:
             peak = A1 + (-self.rate * t1).exp() * (C1 + start * D1) / self.omega
         else:
-            peak = self.at(larger(arb(0), smaller(t1, self.horizon)))
-        return larger(ends, peak) if peak.is_finite() else larger(ends, weak)
+            peak = self.at(arb(0).max(t1.min(self.horizon)))
+        return ends.max(peak) if peak.is_finite() else ends.max(weak)
 
     def at(self, t: Ball) -> Ball:
         """D(t), (2.15)."""
@@ -331,7 +331,7 @@ def blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball:
     n, q, Gamma = setting.n, 2 * setting.predictor(gains), exact(gains.adaptation_rate)
     zb = setting.beside
     if not setting.turns:
-        zb = smaller(setting.blown, n.B * setting.taken)
+        zb = setting.blown.min(n.B * setting.taken)
     both = n.h + R
     drag = zb / q
     radius = drag + root(drag * drag + 2 * both * s1 / (q * Gamma))
@@ -341,7 +341,7 @@ def blown_prediction(setting: Setting, gains: Gains, R: Ball, s1: Ball) -> Ball:
 def speed_needed(setting: Setting, R_H: Fraction, error: Ball) -> Ball:
     """phi + D_E |w| + DB [du dbar + min(Dh + R_H, error)], (4.3), (7.4)."""
     n = setting.n
-    return setting.drifting + n.B * (n.feedback_gain * setting.reach + smaller(n.h + exact(R_H), error))
+    return setting.drifting + n.B * (n.feedback_gain * setting.reach + (n.h + exact(R_H)).min(error))
 
 
 def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Distance | None:
@@ -353,7 +353,7 @@ def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Dist
     if not (
         (n.h_t + n.h_x * Y) / omega <= S  # (4.1)
         and _error(setting, gains, Y) <= e  # (4.2), (7.9)
-        and speed_needed(setting, gains.projection_radius, larger(n.h_initial, S) + e) < Y  # (4.3)
+        and speed_needed(setting, gains.projection_radius, n.h_initial.max(S) + e) < Y  # (4.3)
     ):
         return None
     return Distance(
@@ -375,7 +375,7 @@ def own_distance_proof(setting: Setting, gains: Gains) -> DistanceProof:
 
     def needed(Y: Ball) -> Ball:
         S, e = (n.h_t + n.h_x * Y) / omega, _error(setting, gains, Y)
-        return speed_needed(setting, gains.projection_radius, larger(n.h_initial, S) + e)
+        return speed_needed(setting, gains.projection_radius, n.h_initial.max(S) + e)
 
     Y = risen(needed)
     more = exact(_INFLATION)

@@ -29,7 +29,7 @@ from itertools import product
 
 from flint import arb
 
-from tubecert.recheck.balls import Ball, exact, length, magnitude, sharp_norm
+from tubecert.recheck.balls import Ball, exact, length, sharp_norm
 from tubecert.recheck.boxes import Box, Found
 from tubecert.recheck.cover import Outcome, prove, together
 from tubecert.recheck.lipschitz import norms_below
@@ -176,7 +176,7 @@ class QuadraticNotNegative:
             if i == j:
                 bend[i] = bend[i] + size
             else:
-                bend[i], bend[j] = bend[i] - magnitude(size), bend[j] - magnitude(size)
+                bend[i], bend[j] = bend[i] - size.abs_upper(), bend[j] - size.abs_upper()
         least = [_least(g, h) for g, h in zip(steepest, bend, strict=True)]
         total = value + sum(least, start=arb(0))
         causes = [max(0.0, -float(x.lower())) if x.is_finite() else math.inf for x in least]
@@ -190,7 +190,7 @@ class QuadraticNotNegative:
 
 def _least(g: Ball, h: Ball) -> Ball:
     """A lower bound of g d + h d^2/2 for |d| <= 1, close to the least value where g and h are thin."""
-    slope, bend = magnitude(g), h.lower()
+    slope, bend = g.abs_upper(), h.lower()
     if bend >= slope and bend > 0:
         return (-slope * slope / (2 * bend)).lower()
     return (bend / 2 - slope).lower()

@@ -11,7 +11,7 @@ from itertools import product
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.balls import Ball, between, exact, larger, length, magnitude, root, sharp_norm
+from tubecert.recheck.balls import Ball, between, exact, length, root, sharp_norm
 from tubecert.recheck.cover import CONFIRMED, Boxed, Outcome, prove, stated, together
 from tubecert.recheck.curve import Curve, Part
 from tubecert.recheck.lipschitz import norms_below
@@ -54,7 +54,7 @@ def offset(place: Place) -> Ball:
         sizes.append(length(Program([d for (d,) in apart], ()).run(())))
     largest = sizes[0]
     for size in sizes[1:]:
-        largest = larger(largest, size)
+        largest = largest.max(size)
     return largest
 
 
@@ -211,7 +211,7 @@ class _Speed:
             except ZeroDivisionError:
                 return arb(0), arb("nan")
             low = low + width * root(whole.lower())
-            high = high + width * root(middle + magnitude(bend) * width * width / 24)
+            high = high + width * root(middle + bend.abs_upper() * width * width / 24)
         return low, high
 
     def _at(self, s: Ball) -> tuple[Ball, Ball]:

@@ -13,10 +13,9 @@ from tubecert.recheck.cover import CONFIRMED
 from tubecert.recheck.document import Node, read
 from tubecert.recheck.plans import Knots, Plan
 from tubecert.recheck.sampled_loop.claims import Case
-from tubecert.recheck.sampled_loop.loop import Loop
 from tubecert.recheck.sampled_loop.record import Proven, Recipe, Stage, read_certificate
-from tubecert.recheck.sampled_loop.remainders import Remainders, Size
-from tubecert.recheck.sampled_loop.windows import course_of
+from tubecert.recheck.sampled_loop.remainders import Remainders, Size, course_of
+from tubecert.recheck.sampled_loop.theorem import Loop
 from tubecert.recheck.specification import read_sampled_specification
 from tubecert.spec import load_text
 from tubecert.spec.canonical import canonical

@@ -13,17 +13,16 @@ from sampled_files import SCALAR, SWING
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
+from tubecert.recheck.balls import parted
 from tubecert.recheck.curve import Knots as Curved
 from tubecert.recheck.document import Node
 from tubecert.recheck.obstacles import Obstacle
 from tubecert.recheck.plans import Plan
 from tubecert.recheck.sampled_loop import theorem
 from tubecert.recheck.sampled_loop.claims import _apart
-from tubecert.recheck.sampled_loop.loop import Loop, parted
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
-from tubecert.recheck.sampled_loop.remainders import Remainders, Size, Slow
-from tubecert.recheck.sampled_loop.theorem import Inequalities, Phase, phases_of
-from tubecert.recheck.sampled_loop.windows import Course, course_of
+from tubecert.recheck.sampled_loop.remainders import Course, Remainders, Size, Slow, course_of
+from tubecert.recheck.sampled_loop.theorem import Inequalities, Loop, Phase, phases_of
 from tubecert.recheck.specification import read_sampled_specification
 from tubecert.recheck.specified.trajectory import Tabled
 from tubecert.spec import load_text
@@ -86,7 +85,7 @@ class Case:
         eta = Slow([*map(arb, self.H[:, 0])], *map(arb, (self.size, self.rate, self.first)))
         n, z = self.n, self.z
         stage = Stage(0, (Fraction(10**6),) * n, (Fraction(10**6),), (Fraction(10**6),) * z)
-        phase = Phase(0, stage, [arb(1)] * loop.width, [arb(0)] * (n + 1 + z), [arb(0)] * (n + 1))
+        phase = Phase(0, stage, [arb(1)] * loop.width + [arb(0)] * (n + 1 + z), [arb(0)] * (n + 1))
         recipe = Recipe(self.lags, self.cuts, 2, 8, 1, True)
         start, winds = [*map(arb, self.start)], [(arb_mat(self.E.tolist()), wind)]
         return Inequalities(loop, recipe, [phase], noise, winds, [eta], start, arb(0), self.lags)
@@ -173,7 +172,7 @@ def plain(A, E, start: list[float], wind: float) -> Inequalities:
     winds = [(arb_mat([[x] for x in E]), Size([arb(wind)], length=False))]
     stage, noise = Stage(0, (Fraction(1),) * n, (Fraction(1),), ()), Size([arb(0)] * n, length=False)
     box = [arb(max(abs(x), 1e-9)) for x in start]
-    phase = Phase(0, stage, box, [arb(0)] * (n + 1), [arb(0)] * (n + 1))
+    phase = Phase(0, stage, [*box, *[arb(0)] * (n + 1)], [arb(0)] * (n + 1))
     recipe = Recipe(2, ((),) * (n + 1), 1, 1, 1, True)
     return Inequalities(loop, recipe, [phase], noise, winds, [], [*map(arb, start)], arb(0), 2)
 

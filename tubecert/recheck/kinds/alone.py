@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from tubecert.recheck.balls import Ball, exact, larger, root
+from tubecert.recheck.balls import Ball, exact, root
 from tubecert.recheck.conditions import Setting, margin
 from tubecert.recheck.cover import Claim, Outcome, stated
 from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
@@ -97,7 +97,7 @@ def settled(setting: Setting, h: Ball) -> Ball:
 
 def supremum(setting: Setting, h: Ball) -> Ball:
     """sup D of (4.0) over the horizon: at one of its ends."""
-    return larger(setting.n.initial_distance, _at_the_end(setting, h))
+    return setting.n.initial_distance.max(_at_the_end(setting, h))
 
 
 def _at_the_end(setting: Setting, h: Ball) -> Ball:

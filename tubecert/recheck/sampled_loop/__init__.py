@@ -5,8 +5,8 @@ In: a document of its format. Out: claims, as of every certificate. Trusted: yes
 | module | what it does |
 |---|---|
 | `record` | the certificate, read into closed types |
-| `windows`, `remainders` | the plan in windows; suprema on the tube |
-| `loop`, `theorem` | the loop over a sample; the inequalities at every sample |
+| `remainders` | the plan in windows; suprema on the tube |
+| `theorem` | the loop over a sample; the inequalities at every sample |
 | `claims` | all claims in their order, and those about obstacles |
 | `exported` | a controller in C against its certificate |
 """

@@ -11,7 +11,7 @@ from math import ceil, inf, isfinite
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.balls import Ball, exact
+from tubecert.recheck.balls import Ball, column, exact, joined, sizes
 from tubecert.recheck.clearances import along, contains, somewhere
 from tubecert.recheck.cover import CONFIRMED, Claim, Outcome, stated, together
 from tubecert.recheck.cover import Range as Ends
@@ -19,11 +19,9 @@ from tubecert.recheck.curve import Segment
 from tubecert.recheck.metric import smooth
 from tubecert.recheck.obstacles import Obstacle, Point
 from tubecert.recheck.plans import serves
-from tubecert.recheck.sampled_loop.loop import Loop, column, joined, sizes
 from tubecert.recheck.sampled_loop.record import Certificate, Proven, single
-from tubecert.recheck.sampled_loop.remainders import PLAN, Remainders, Size, Slow
-from tubecert.recheck.sampled_loop.theorem import Inequalities, Phase, phases_of
-from tubecert.recheck.sampled_loop.windows import Course, course_of
+from tubecert.recheck.sampled_loop.remainders import PLAN, Course, Remainders, Size, Slow, course_of
+from tubecert.recheck.sampled_loop.theorem import Inequalities, Loop, Phase, phases_of
 from tubecert.recheck.specification import SampledSpecification
 from tubecert.recheck.specified.numbers import TIME, Range
 from tubecert.recheck.specified.trajectory import Expressed, Planned
@@ -106,9 +104,8 @@ class Case:
         noise, phases = Size.of(machine.noise, n), []
         for begin, stage, acting in phases_of(own.stages, loop.waiting):
             W, Z, U = (list(map(exact, sizes_)) for sizes_ in (stage.half_widths, stage.memory, acting))
-            box = [*W, *Z, *U * loop.waiting, *(eta.size for eta in self.slow)]
-            rounded, rho = self._rounding(noise, W, Z), self.remainders.rho(W, U, self.slow)
-            phases.append(Phase(begin, stage, box, rounded, rho))
+            box = [*W, *Z, *U * loop.waiting, *(eta.size for eta in self.slow), *self._rounding(noise, W, Z)]
+            phases.append(Phase(begin, stage, box, self.remainders.rho(W, U, self.slow)))
         last, horizon = own.stages[-1].start + loop.whole + 1 + own.recipe.lags, self.course.horizon
         if horizon is not None:
             last = min(last, ceil(horizon / machine.sample_time) - 1)

@@ -27,7 +27,7 @@ from tubecert.recheck.cover import Outcome, stated
 from tubecert.recheck.document import Node
 from tubecert.recheck.program import Program
 from tubecert.recheck.sampled_loop.record import Certificate, Proven, read_certificate, single
-from tubecert.recheck.sampled_loop.windows import Course, course_of
+from tubecert.recheck.sampled_loop.remainders import Course, course_of
 from tubecert.recheck.specification import SampledSpecification
 from tubecert.recheck.specified.trajectory import Expressed, Resting
 from tubecert.recheck.terms import operation, variable

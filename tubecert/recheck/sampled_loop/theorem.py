@@ -1,10 +1,12 @@
 """The inequalities of the sampled loop at every sample: of the errors, of what the controller adds, of its memory.
 
-b(k) bounds an output at sample k if the loop has kept to its boxes before; below what is claimed at every k there is no
-first exit. An output is a row, carried back lag by lag: r_i is the middle of the enclosed q_i = r_(i-1) AA. Any
-numbers would do ("free rows"): what they miss, |q_i - r_i| times the box of xi, is added. From a lag of its own on a
-slow signal is taken for any one ("cut"). A product of a row with balls around 0 is a sum of magnitudes.
-Implements: theory of the sampled loop, sections 3 and 5.
+s = (e, zeta, v_1..v_b, eta, heard): the error, the controller's memory, the deltas of the b samples before (which the
+delay keeps waiting), the slow signals, together xi; and what is heard at a sample, noise and rounding of dy, rounding
+of u and of zeta. b(k) bounds an output at sample k if the loop has kept to its boxes before; below what is claimed at
+every k there is no first exit. An output is a row times s, carried back lag by lag: r_i is the middle of the enclosed
+q_i = r_(i-1) AA, without what is heard. Any numbers would do ("free rows"): what they miss, |q_i - r_i| times the box
+of s, is added. From a lag of its own on a slow signal is taken for any one ("cut"). A product of a row with balls
+around 0 is a sum of magnitudes. Implements: theory of the sampled loop, sections 2, 3 and 5.
 """
 
 from __future__ import annotations
@@ -19,9 +21,8 @@ from itertools import accumulate, chain, pairwise, product
 
 from flint import arb, arb_mat, ctx
 
-from tubecert.recheck.balls import Ball, between, exact
+from tubecert.recheck.balls import Ball, around_zero, between, exact, joined, picked, sizes, stacked
 from tubecert.recheck.cover import CONFIRMED, Outcome, time_is_up, told
-from tubecert.recheck.sampled_loop.loop import Loop, around_zero, joined, parted, picked, sizes, stacked
 from tubecert.recheck.sampled_loop.record import Recipe, Stage
 from tubecert.recheck.sampled_loop.remainders import Size, Slow
 
@@ -31,17 +32,77 @@ _TELLS = 64  # lags
 _MOST_TERMS = 8_000_000  # kept: outputs x phases x lags
 
 
+class Loop:
+    """A (n, n), B (n, m), H (n, r); tables F (z, z), G (z, n), M (m, z), N (m, n); sample time and delay in s.
+
+    `whole` samples of delay, Q, and the `rest` tau'; `waiting`, b: of how many earlier samples a delta acts or waits.
+    `parts`: rows that pick e (n), zeta (z), v_1..v_b (m each), eta (r), with which the `width` entries of xi end, and
+    what is heard of dy (n), u (m), zeta (z). `sent`: rows of delta_k, v_1, .., v_b, (m, ..) each.
+    """
+
+    def __init__(
+        self, A: arb_mat, B: arb_mat, H: arb_mat, tables: Sequence[arb_mat], times: tuple[Fraction, Fraction]
+    ) -> None:
+        (F, G, M, N), (sample, delay) = tables, times
+        self.A, self.B, self.H, self.sample = A, B, H, sample
+        self.whole, self.rest = divmod(delay, sample)
+        self.waiting = self.whole + (self.rest > 0)
+        n, m, z = A.nrows(), B.ncols(), F.nrows()
+        ends = [0, *accumulate([n, z, *[m] * self.waiting, H.ncols(), n, m, z])]
+        self.parts, self.width, self.size = (
+            [picked(range(a, b), ends[-1]) for a, b in pairwise(ends)],
+            *ends[-4::3],
+        )
+        e, zeta, *waiting, _, heard, rounded, lost = self.parts
+        self.sent = [N * (e + heard) + M * zeta + rounded, *waiting]
+        self._kept = G * (e + heard) + F * zeta + lost
+
+    def flow(self, t: Ball, order: int = 0) -> arb_mat:
+        """e^(S t) with S = [A H B; 0 0 0; 0 0 0], or its derivative of an order, for every t of the ball.
+
+        It moves (e, eta, a held input): with P = e^(A t) and J its integral, e^(S t) = [P JH JB; 0 I 0; 0 0 I].
+        """
+        rates = joined([[self.A, self.H, self.B]])
+        rates = stacked([rates, arb_mat(rates.ncols() - rates.nrows(), rates.ncols())])
+        found = (rates * t).exp()
+        for _ in range(order):
+            found = rates * found
+        return found
+
+    def error(self, s: Ball, order: int = 0, *, later: bool) -> arb_mat:
+        """Rows of e(t_k + s), (n, ..), but for what acts on it from t_k on; or their derivative of an order.
+
+        `later`: s is not before tau'.
+        """
+        e, eta, before, now = self.parts[0], self.parts[-4], self.sent[-1], self.sent[self.whole]
+        found = self.flow(s, order) * stacked([e, eta, before])
+        if later:
+            found += self.flow(s - exact(self.rest), order) * stacked([0 * e, 0 * eta, now - before])
+        return picked(range(e.nrows()), found.nrows()) * found
+
+    @property
+    def step(self) -> arb_mat:
+        """Rows of xi_(k+1), AA and NN beside one another; of what is heard then, nothing."""
+        moved, none = self.error(exact(self.sample), later=True), arb_mat(self.size - self.width, self.size)
+        return stacked([moved, self._kept, *self.sent[:-1], self.parts[-4], none])
+
+    @property
+    def without_heard(self) -> arb_mat:
+        """Rows times it are those without what is heard."""
+        known = picked(range(self.width), self.size)
+        return known.transpose() * known
+
+
 @dataclass(frozen=True)
 class Phase:
     """What is known at samples from `start` on, while `stage` lasts and commands of the same stages act or wait.
 
-    The box of xi; rounding of what is `heard`, dy (n), u (m), zeta (z); the remainder `acting` through [I, B] (n + m).
+    The box of s, without the noise; the remainder `acting` through [I, B] (n + m).
     """
 
     start: int
     stage: Stage
     box: Sequence[Ball]
-    heard: Sequence[Ball]
     acting: Sequence[Ball]
 
 
@@ -136,22 +197,18 @@ class Inequalities:
     # -- signals
 
     @cached_property
-    def _boxes(self) -> Amplitudes:
-        """Of xi."""
-        return Amplitudes.around_zero((own.box for own in self.phases), [])
-
-    @cached_property
-    def _heard(self) -> Amplitudes:
-        """Of noise and rounding of dy (n), of rounding of u (m) and of zeta (z)."""
-        return Amplitudes.around_zero((own.heard for own in self.phases), [(0, self.noise)])
+    def _known(self) -> Amplitudes:
+        """Of s."""
+        return Amplitudes.around_zero((own.box for own in self.phases), [(self.loop.width, self.noise)])
 
     @cached_property
     def _begun(self) -> Amplitudes:
         """xi_0, signed where it is known."""
-        still = self.loop.width - len(self.error) - len(self.slow)
-        begun = [*self.error, *[arb(0)] * still, *(arb(0, own.first.abs_upper()) for own in self.slow)]
-        near = picked(range(len(self.error)), self.loop.width).transpose(), arb_mat([[arb(0, self.radius)]])
-        return Amplitudes(arb_mat([[x] for x in begun]), [near] if self.radius > 0 else [])
+        loop, n, slow = self.loop, len(self.error), [arb(0, own.first.abs_upper()) for own in self.slow]
+        still, heard = [arb(0)] * (loop.width - n - len(slow)), [arb(0)] * (loop.size - loop.width)
+        near = loop.parts[0].transpose(), arb_mat([[arb(0, self.radius)]])
+        begun = arb_mat([[x] for x in (*self.error, *still, *slow, *heard)])
+        return Amplitudes(begun, [near] if self.radius > 0 else [])
 
     @cached_property
     def _acting(self) -> Amplitudes:
@@ -170,10 +227,10 @@ class Inequalities:
         return stacked([on_e, picked(range(r, 2 * r), on_e.ncols()), arb_mat(loop.B.ncols(), on_e.ncols())])
 
     def _gamma(self, age: Ball, order: int = 0) -> arb_mat:
-        """What they do to xi in that time, (width, signals), or its derivative of an order."""
-        e, *_, eta, _, held, _ = self.loop.parts
-        moved, _ = parted(stacked([e, eta, held]), self.loop.width)
-        return moved.transpose() * (self.loop.flow(age, order) * self._entries)
+        """What they do to s in that time, (size, signals), or its derivative of an order."""
+        e, *_, eta, _, _, _ = self.loop.parts
+        held = arb_mat(self.loop.B.ncols(), self.loop.size)  # no entry of s
+        return stacked([e, eta, held]).transpose() * (self.loop.flow(age, order) * self._entries)
 
     def _kernels(self, until: Fraction) -> list[arb_mat]:
         """Through these rows have int_0^until |r gamma| at most: |g| <= chord + (d^3/12 a panel) sup|g''|."""
@@ -198,8 +255,8 @@ class Inequalities:
 
     def _within(self, kernels: Sequence[arb_mat]) -> arb_mat:
         """What acts on e within a sample, slow signals by their rates: (n, phases)."""
-        n, rates_only = len(self.error), product(range(len(self.error)), range(len(self.slow)))
-        return self._through(picked(range(n), self.loop.width), kernels, list(rates_only))
+        rates_only = list(product(range(len(self.error)), range(len(self.slow))))
+        return self._through(self.loop.parts[0], kernels, rates_only)
 
     @cached_property
     def _off(self) -> list[list[list[Ball]]]:
@@ -209,9 +266,7 @@ class Inequalities:
             for a, b in pairwise(self.nodes):
                 s, square = between(exact(a).lower(), exact(b).upper()), exact((b - a) ** 2 / 8)
                 rates = self.loop.error(s, 2, later=a >= self.loop.rest)
-                of_xi, heard = parted(rates, self.loop.width)
-                bent = self._boxes.of(of_xi) + self._heard.of(heard) + self._within([self._gamma(s, 1)])
-                found.append((bent * square).tolist())
+                found.append(((self._known.of(rates) + self._within([self._gamma(s, 1)])) * square).tolist())
         return found
 
     # -- from sample to sample
@@ -222,23 +277,27 @@ class Inequalities:
 
         Raises `ArithmeticError` if these are too many, or the time is up.
         """
-        lags, last, count = min(self.recipe.lags, self.last), self.last, len(self.phases)
+        lags, last = min(self.recipe.lags, self.last), self.last
         terms, started = [], []
         for q, found in self._lags(lags):
-            terms.append([[x.abs_upper() for x in row] for row in found.tolist()])
+            terms.append(sizes(found).tolist())
             started.append(sizes(self._begun.of(q)).entries())
-        late, later = self._boxes.of(q).tolist(), [self.phase(k) for k in range(1, last + 1 - lags)]
+        late, later = self._known.of(q * self.loop.without_heard).tolist(), range(1, last + 1 - lags)
         ends = [*(own.start for own in self.phases), last + 1]
         spans = [  # by sample: which lags, from one to another, are of samples of which phase
-            [(p, max(0, k + 1 - ends[p + 1]), min(lags, k - ends[p]) + 1) for p in range(count)]
+            [
+                (p, max(0, k + 1 - end), min(lags, k - begin) + 1)
+                for p, (begin, end) in enumerate(pairwise(ends))
+            ]
             for k in range(last + 1)
         ]
         spans = [[(p, low, high) for p, low, high in own if low < high] for own in spans]
         carried = []
         for f in range(q.nrows()):
-            sums = [list(accumulate((own[f][p] for own in terms), initial=arb(0))) for p in range(count)]
+            columns = zip(*(own[f] for own in terms), strict=True)
+            sums = [list(accumulate(column, initial=arb(0))) for column in columns]
             gathered = (sum((sums[p][b] - sums[p][a] for p, a, b in own), start=arb(0)) for own in spans)
-            rest = chain((own[f] for own in started), (late[f][p].abs_upper() for p in later))
+            rest = chain((own[f] for own in started), (late[f][self.phase(k)].abs_upper() for k in later))
             carried.append([x + y for x, y in zip(gathered, rest, strict=True)])
         return carried
 
@@ -247,11 +306,14 @@ class Inequalities:
         loop, n, r = self.loop, len(self.error), len(self.slow)
         with ctx.workprec(_SETUP_BITS):
             nodes = [loop.error(exact(s), later=s >= loop.rest) for s in self.nodes]
-            q, heard = parted(stacked([*nodes, loop.sent[0], loop.parts[1]]), loop.width)
-            step, arriving = parted(loop.step, loop.width)
+            q, step, without_heard = (
+                stacked([*nodes, loop.sent[0], loop.parts[1]]),
+                loop.step,
+                loop.without_heard,
+            )
             acting = [self._within(self._kernels(s)) for s in self.nodes]
             found = stacked([*acting, arb_mat(q.nrows() - n * len(nodes), len(self.phases))])
-            found, kernels = found + self._heard.of(heard), self._kernels(loop.sample)
+            kernels = self._kernels(loop.sample)
         if q.nrows() * len(self.phases) * lags > _MOST_TERMS:
             raise ArithmeticError("there are too many rows, phases and lags")
         each = enumerate(self.recipe.cuts[:n] * len(nodes) + self.recipe.cuts[n:])
@@ -263,15 +325,15 @@ class Inequalities:
                 raise ArithmeticError("the time was up")
             if lag % _TELLS == 0 and (tell := told()) is not None:
                 tell(lag, lag / (lags + 1))
-            rows = q.mid()
+            rows = q.mid() * without_heard
             missed = q - rows
             for place, entry in owed.items():
                 missed[place] = entry
-            yield q, found + self._boxes.of(missed)
+            yield q, found + self._known.of(missed)
             owed = {(f, eta + c): rows[f, eta + c] for (f, c), at in cuts.items() if at == lag}
             for f, c in owed:
                 rows[f, c] = 0
                 off ^= {(f, c - eta), (f, c - eta + r)}
-            found, q = self._through(rows, kernels, off) + self._heard.of(rows * arriving), rows * step
+            found, q = self._through(rows, kernels, off), rows * step
             for f, c in (place for place, at in cuts.items() if at <= lag):
                 q[f, eta + c] = 0
