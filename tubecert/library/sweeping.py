@@ -235,13 +235,13 @@ def _written(folder: Path, table: SweepTable) -> tuple[str, ...]:
     """Write table, page and figures; their names. Raises `TargetError`."""
     from tubecert import certificate
     from tubecert.report.figures_file import svg_file
-    from tubecert.report.figures_sweep import sweep_figures, with_figures
+    from tubecert.report.figures_sweep import sweep_figures
     from tubecert.report.html import render_page
     from tubecert.report.sweep import page_of
 
     texts = {"table.csv": table.csv()}
     drawn = sweep_figures(table)
-    texts["sweep.html"] = render_page(with_figures(page_of(table), drawn))
+    texts["sweep.html"] = render_page(page_of(table, drawn))
     for figure in drawn:
         texts[f"figures/{figure.key.removeprefix('sweep-')}.svg"] = svg_file(figure)
     for name, text in texts.items():

@@ -11,7 +11,7 @@ from itertools import islice
 from math import isfinite
 
 from tubecert.bounds.constants import EVERY, meaning
-from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result, TubeData
+from tubecert.certificate.result import Bound, Certificate, MetricData, Result, TubeData
 from tubecert.claims.conditions import SAYS, SHOWN, condition_name, equation
 from tubecert.claims.statements import InputWithinLimits
 from tubecert.digits import UNKNOWN, down, exact, short, up
@@ -20,6 +20,7 @@ from tubecert.records import to_json
 from tubecert.report import claimed, reach
 from tubecert.report.certificate_brief import first_blocks, reasons
 from tubecert.report.figures_gains import trade_off
+from tubecert.report.figures_scene import labelled
 from tubecert.report.figures_tube import input_figures, state_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.outline import level_set, widths
@@ -142,21 +143,16 @@ def _sections(
 # -- section by section
 
 
-def gains_table(result: Result) -> Table | None:
-    """Every set of gains, a row each; None if there is none."""
-    found = list(rows(result))
-    columns = ("certificate", "gains", "!verdict", ">ω (rad/s)", ">Γ", ">margin left")
-    note = _ROWS if any(row.decides for row in found) else ""
-    return Table.of(columns, map(_gains_row, found), note) if found else None
-
-
 def _gains(result: Result) -> Iterator[Block]:
     if not result.sections:
         return
-    if (table := gains_table(result)) is not None:
-        yield table
-    found = {row.section for row in rows(result)}
-    if missing := [NAMES[key] for key in NAMES if key in result.sections and key not in found]:
+    found = list(rows(result))
+    columns = ("certificate", "gains", "!verdict", ">ω (rad/s)", ">Γ", ">margin left")
+    if found:
+        note = _ROWS if any(row.decides for row in found) else ""
+        yield Table.of(columns, map(_gains_row, found), note)
+    known = {row.section for row in found}
+    if missing := [NAMES[key] for key in NAMES if key in result.sections and key not in known]:
         yield Words(text=f"No gains were found for {', '.join(missing)}.")
     yield from reasons(result, [each for each in result.reasons if each.verdict is Verdict.CERTIFIED])
     chart = trade_off(result)
@@ -165,14 +161,9 @@ def _gains(result: Result) -> Iterator[Block]:
 
 
 def _gains_row(row: Gains) -> tuple[str, ...]:
+    chosen = f"{row.chosen} *" if row.decides else row.chosen
     gains = ("" if gain is None else exact(gain) for gain in (row.pair.bandwidth, row.pair.adaptation_rate))
-    return (
-        NAMES[row.section],
-        f"{row.chosen} *" if row.decides else row.chosen,
-        row.verdict,
-        *gains,
-        row.slack,
-    )
+    return NAMES[row.section], chosen, row.verdict, *gains, row.slack
 
 
 def _filled(result: Result) -> Iterator[Block]:
@@ -221,38 +212,32 @@ def _radii(result: Result, tube: TubeData) -> Iterator[tuple[str, str]]:
 
 
 def _inputs(result: Result) -> Iterator[Block]:
+    columns = (
+        "input", "limits", "!verdict", ">on the plan", "loop of", ">stays within", ">used", ">feedback adds",
+        ">adaptation adds",
+    )  # fmt: skip
     if result.inputs:
-        yield _input_table(result)
+        yield Table.of(columns, _input_rows(result), _INPUTS)
     if figures := tuple(input_figures(result)):
         yield Figures(figures=figures)
         if not result.inputs:
             yield Words(text=_NO_LIMITS)
 
 
-def _input_table(result: Result) -> Table:
-    columns = (
-        "input", "limits", "!verdict", ">on the plan", "loop of", ">stays within", ">used", ">feedback adds",
-        ">adaptation adds",
-    )  # fmt: skip
-    rows = (_input_row(result, own, key) for own in result.inputs for key in _loops(own))
-    return Table.of(columns, rows, _INPUTS)
-
-
-def _loops(own: InputData) -> list[str | None]:
-    """The kinds that bound an input, in their order; one row without any if there is none."""
-    found: list[str | None] = [key for key in NAMES if key in own.bounds]
-    return found or [None]
-
-
-def _input_row(result: Result, own: InputData, key: str | None) -> tuple[str, ...]:
-    unit = result.spec.effective.system.units.get(own.input, "")
-    name, limits = f"{own.input} ({unit})" if unit else own.input, reach.ends_of(own.limits)
-    first = (name, limits, own.verdict, reach.span_of(own.plan.least.below, own.plan.greatest.above))
-    if key is None:
-        return (*first, *(UNKNOWN,) * 5)
-    bound = own.bounds[key]
-    span, added = reach.span_of(bound.least, bound.greatest), (up(bound.feedback), up(bound.adaptation))
-    return (*first, NAMES[key], span, reach.used(own, key), *added)
+def _input_rows(result: Result) -> Iterator[tuple[str, ...]]:
+    """An input with every kind that bounds it, in their order; one row without any if there is none."""
+    for own in result.inputs:
+        name, limits = labelled(own.input, result.spec.effective.system), reach.ends_of(own.limits)
+        first = name, limits, own.verdict, reach.span_of(own.plan.least.below, own.plan.greatest.above)
+        for key in (key for key in NAMES if key in own.bounds):
+            bound = own.bounds[key]
+            span, added = (
+                reach.span_of(bound.least, bound.greatest),
+                (up(bound.feedback), up(bound.adaptation)),
+            )
+            yield (*first, NAMES[key], span, reach.used(own, key), *added)
+        if not own.bounds:
+            yield (*first, *(UNKNOWN,) * 5)
 
 
 def _conditions(result: Result) -> Iterator[Block]:

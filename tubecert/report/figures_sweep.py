@@ -6,7 +6,6 @@ In: the table of a sweep. Out: figures. A value is drawn where its own kind is c
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import groupby, pairwise, product
 from math import sqrt
 from typing import Final
@@ -16,7 +15,6 @@ import numpy as np
 from tubecert.digits import short
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.figures_gains import STYLES
-from tubecert.report.page import Block, Figures, Page, Section, Words
 from tubecert.report.quantities import Quantity
 from tubecert.report.sweep import ERROR, Row, SweepTable
 from tubecert.sweep import grid
@@ -39,14 +37,6 @@ def sweep_figures(table: SweepTable) -> list[Chart]:
     if len(table.axes) == 1:
         return list(_curves(table, table.axes[0]))
     return list(_maps(table)) if len(table.axes) == 2 else []
-
-
-def with_figures(page: Page, drawn: Sequence[Chart]) -> Page:
-    """The page of a sweep with its figures, or with why there are none."""
-    shown: Block = Figures(figures=tuple(drawn))
-    if not drawn:
-        shown = Words(text="Figures are drawn for one or two keys whose values are numbers in order.")
-    return replace(page, sections=(*page.sections, Section(key="figures", title="Figures", blocks=(shown,))))
 
 
 def _ordered(values: Sequence[float]) -> bool:

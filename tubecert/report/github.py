@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import accumulate
 from pathlib import Path
 
@@ -19,8 +19,8 @@ from tubecert.report import markdown
 from tubecert.report.findings import page_of, summary
 
 _COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
-_DATA = {"%": "%25", "\r": "%0D", "\n": "%0A"}
-_PROPERTY = _DATA | {":": "%3A", ",": "%2C"}
+_DATA = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
+_PROPERTY = _DATA | str.maketrans({":": "%3A", ",": "%2C"})
 _LARGEST_SUMMARY = 1_000_000  # GitHub refuses more than 1 MiB
 
 
@@ -46,16 +46,12 @@ def annotation(finding: Finding) -> str:
 
 def escape_data(text: str) -> str:
     """A message as it may stand after `::`."""
-    return _replaced("\n".join(map(visible, text.split("\n"))), _DATA)
+    return "\n".join(map(visible, text.split("\n"))).translate(_DATA)
 
 
 def escape_property(text: str) -> str:
     """A value as it may stand between `=` and `,`."""
-    return _replaced(visible(text), _PROPERTY)
-
-
-def _replaced(text: str, table: Mapping[str, str]) -> str:
-    return "".join(table.get(character, character) for character in text)
+    return visible(text).translate(_PROPERTY)
 
 
 def relative(file: str) -> str:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 from tubecert.digits import up
 from tubecert.report.claimed import size
+from tubecert.report.figures_axes import Chart
 from tubecert.report.gains import deciding
-from tubecert.report.page import Page, Section, Table
+from tubecert.report.page import Figures, Page, Section, Table, Words
 from tubecert.report.quantities import Quantity, Value, failed, lacking, merged, quantities, table_text
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.sweep.grid import Axis
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 ERROR: Final = "error"
 _MOST: Final = 500  # rows on a page
+_NONE_DRAWN: Final = "Figures are drawn for one or two keys whose values are numbers in order."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,15 +130,17 @@ def _found(outcome: Certificate | SampledCertificate) -> str:
     return "; ".join(row.text() for row in deciding(outcome.result))
 
 
-def page_of(table: SweepTable) -> Page:
-    """The page; the whole table is in a file beside it. Figures are left to `figures_sweep`, which draws them."""
+def page_of(table: SweepTable, drawn: Sequence[Chart] | None = None) -> Page:
+    """The page, with the figures that `figures_sweep` has drawn, if any was asked; the whole table is beside it."""
     keys = ", ".join(f"{axis.path} ({len(axis.texts)} values)" for axis in table.axes)
+    figures = Figures(figures=tuple(drawn or ())) if drawn else Words(text=_NONE_DRAWN)
+    parts = ("points", "Points", [_points(table)]), ("figures", "Figures", [] if drawn is None else [figures])
     return Page(
         name=table.name,
         verdict="",
         summary=_summary(table),
         meaning=f"Each point is a certification of its own. The keys that were changed: {keys}.",
-        sections=(Section(key="points", title="Points", blocks=(_points(table),)),),
+        sections=tuple(Section.each(parts)),
         about="sweep",
     )
 
