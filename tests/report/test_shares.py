@@ -8,6 +8,7 @@ from proven import proven
 from tubecert.certificate.result import Certificate
 from tubecert.digits import exact
 from tubecert.report.certificate_brief import beyond_its_theorem, less_by_distance
+from tubecert.report.figures_gains import trade_off
 from tubecert.report.gains import rows
 from tubecert.report.shares import filled
 
@@ -72,3 +73,10 @@ def test_where_a_decides_unasked_it_is_said_what_b_asks_for():
     assert line.endswith(f"Gamma = {exact(least)}, by B, distance: --conditions B")
     assert not list(less_by_distance(Certificate.from_json(proven(calm)).result))
     assert not list(less_by_distance(replace(unasked, decided_by=("distance",))))
+
+
+@pytest.mark.slow
+def test_a_curve_of_what_is_not_certified_says_so():
+    chart = trade_off(Certificate.from_json(proven(WINDY)).result)
+    assert chart.legend[0] == ("a", "A paper's conditions, undecided")
+    assert ("b", "B distance") in chart.legend

@@ -11,6 +11,7 @@ from typing import Final
 from tubecert.certificate.result import MetricRow, Result
 from tubecert.report.figures_axes import Axis, Chart, Point
 from tubecert.report.gains import NAMES, Gains, rows
+from tubecert.verdict import Verdict
 
 STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b"}
 _DRAWN: Final = {
@@ -35,14 +36,15 @@ def trade_off(result: Result) -> Chart | None:
     chart = Chart(key="trade-off", title=title, x=x, y=y, caption=_FOUND)
     for section, points in curves.items():
         if len(points) > 1:
-            chart.line(points, STYLES[section], NAMES[section])
+            verdict = result.sections[section].verdict
+            told = "" if verdict is Verdict.CERTIFIED else f", {verdict}"
+            chart.line(points, STYLES[section], NAMES[section] + told)
     for row, place in chosen:
-        style, size = (" decides", 6.0) if row.decides else ("", 4.5)
-        words, tip = (
-            "decides the verdict" if row.decides else "",
-            f"{NAMES[row.section]}, {row.chosen}: {row.text()}",
-        )
-        chart.dot(place, STYLES[row.section] + style, words, tip=tip, size=size)
+        tip, style = f"{NAMES[row.section]}, {row.chosen}: {row.text()}", STYLES[row.section]
+        if row.decides:
+            chart.dot(place, f"{style} decides", "decides the verdict", tip=tip, size=6)
+        else:
+            chart.dot(place, style, tip=tip)
     return chart
 
 

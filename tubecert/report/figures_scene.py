@@ -25,7 +25,7 @@ from tubecert.report.figures_axes import (
 
 _ZOOM = 4.0  # a safe set larger than this many tubes is shown in part
 _HEIGHT = 190
-_FINE = 0.2  # units of the viewport
+_FINE = 0.1  # units of the viewport
 TUBE = {True: "tube", False: "unproven"}  # the style, by whether it is proven
 
 
