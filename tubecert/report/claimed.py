@@ -22,7 +22,7 @@ NOT_RECHECKED = (
 
 def span(result: Result) -> str:
     """The time that is claimed."""
-    last = horizon(result)
+    last = result.spec.effective.trajectory.horizon
     return "for all t >= 0" if last is None else f"for 0 <= t <= {short(last, 12)} s"
 
 
@@ -56,16 +56,6 @@ def _place(low: str, high: str) -> str:
     """`= 0.1`, or `in [0, 0.1]`; with pi in it, a number is a range as wide as its 30th digit."""
     a, b = end(Fraction(low)), end(Fraction(high))
     return f"= {a}" if a == b else f"in [{a}, {b}]"
-
-
-def horizon(result: Result) -> Fraction | None:
-    """The end of the plan in s, None if it has none."""
-    return result.spec.effective.trajectory.horizon
-
-
-def radius(result: Result) -> Fraction | None:
-    """The radius of the tube, None if there is none."""
-    return None if result.tube is None else result.tube.rho
 
 
 def point(result: Result, at: Witness) -> str:

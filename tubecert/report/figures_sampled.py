@@ -14,7 +14,7 @@ import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.report.figures_axes import BOTTOM, TOP, Axis, Chart, Point
-from tubecert.report.figures_scene import Plane, labelled, over_time, scene
+from tubecert.report.figures_scene import Plane, labelled, over_time
 from tubecert.sampled_loop.record import Certificate, Result, Shares
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import SHARES, percents
@@ -118,8 +118,15 @@ def _planes(result: Result, x: Array, widths: Array) -> Iterator[Chart]:
     for names in dict.fromkeys(obstacle.states for obstacle in effective.obstacles):
         i, j = map(effective.system.states.index, names)
         tube = widths[:, [i, j]].max(axis=0) * [(1, 1), (-1, 1), (-1, -1), (1, -1)]
-        plane = Plane.of(effective.system, (i, j), x, tube, [safe[name] for name in names])
-        yield scene(f"plane-{i}-{j}", plane, effective.obstacles, proven=_proven(result)[0])
+        plane = Plane(
+            effective=effective,
+            pair=(i, j),
+            plan=x[:, [i, j]],
+            tube=tube,
+            safe=(safe[names[0]], safe[names[1]]),
+            proven=_proven(result)[0],
+        )
+        yield plane.chart(f"plane-{i}-{j}")
 
 
 def _bars(filled: Mapping[str, Shares]) -> Chart:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tubecert.certificate.effective import ObstacleView, SystemView
+from tubecert.certificate.effective import Effective, ObstacleView, SystemView
 from tubecert.enclosure.interval import Array
 from tubecert.report.figures_axes import (
     BOTTOM,
@@ -78,68 +78,47 @@ def labelled(name: str, system: SystemView) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plane:
-    """What is known in the plane of two states: the plan (K, 2), the outline (N, 2) of the tube, the safe set."""
+    """The plane of two states, by their places: the plan (K, 2), the outline (N, 2) of the tube, the safe set."""
 
-    names: tuple[str, str]
-    units: tuple[str, str]
-    labels: tuple[str, str]
+    effective: Effective
+    pair: tuple[int, int]
     plan: Array
     tube: Array | None
     safe: tuple[Point, Point]
+    proven: bool
 
-    @classmethod
-    def of(
-        cls, system: SystemView, pair: tuple[int, int], x: Array, tube: Array | None, safe: Sequence[Point]
-    ) -> Plane:
-        """The plane of two states by their places; `x` (K, n) is the plan, `safe` the range of each of the two."""
-        names = system.states[pair[0]], system.states[pair[1]]
-        return cls(
-            names=names,
-            units=(system.units.get(names[0], ""), system.units.get(names[1], "")),
-            labels=(labelled(names[0], system), labelled(names[1], system)),
-            plan=x[:, pair],
-            tube=tube,
-            safe=((safe[0][0], safe[1][0]), (safe[0][1], safe[1][1])),
-        )
+    def chart(self, key: str, marks: Sequence[Point] = ()) -> Chart:
+        """The safe set, the tube, the plan, and the obstacles in the plane; there is room for `marks`."""
+        system = self.effective.system
+        names = system.states[self.pair[0]], system.states[self.pair[1]]
+        x, y = self._axes([labelled(name, system) for name in names], marks)
+        across, height = WIDTH - LEFT - RIGHT, HEIGHT
+        if system.units.get(names[0]) == system.units.get(names[1]):  # a circle is round, if there is room
+            height = round(across * (y.high - y.low) / (x.high - x.low)) + TOP + BOTTOM
+            height = min(max(height, 200), 420)
+        title = f"Tube in the plane of {names[0]} and {names[1]}"
+        chart = Chart(key=key, title=title, x=x, y=y, height=height)
+        chart.box((x.low, y.low), (x.high, y.high), "outside")
+        (left, right), (bottom, top) = self.safe
+        chart.box((left, bottom), (right, top), "safe", "safe set")
+        if len(self.plan) and self.tube is not None and np.isfinite(self.tube).all():
+            up = height - TOP - BOTTOM
+            fine = _FINE * np.array([(x.high - x.low) / across, (y.high - y.low) / up])
+            words = "tube" if self.proven else "tube, not proven to stay in the safe set"
+            chart.area(swept(self.plan, self.tube, fine), TUBE[self.proven], words)
+        if len(self.plan) > 1:
+            chart.line(self.plan, "plan", "plan")
+        for obstacle in self.effective.obstacles:
+            if set(obstacle.states) == set(names):
+                chart.area([_shape(obstacle, names)], "obstacle", "obstacle")
+        return chart
 
-    def axes(self, marks: Sequence[Point] = ()) -> tuple[Axis, Axis]:
+    def _axes(self, labels: Sequence[str], marks: Sequence[Point]) -> list[Axis]:
         """Axes that show the tube, the marks, and of the safe set as much as leaves the tube visible."""
         reach = np.zeros(2) if self.tube is None else np.abs(self.tube).max(axis=0)
         shown = np.concatenate([self.plan - reach, self.plan + reach, np.reshape(marks, (-1, 2))])
-        safe = [(self.safe[0][i], self.safe[1][i]) for i in (0, 1)]
-        near = all(is_near(shown[:, i], safe[i]) for i in (0, 1))
-        first, second = (view(shown[:, i], safe[i], self.labels[i], near=near) for i in (0, 1))
-        return first, second
-
-
-def scene(
-    key: str, plane: Plane, obstacles: Sequence[ObstacleView], marks: Sequence[Point] = (), *, proven: bool
-) -> Chart:
-    """A chart with the safe set, the tube, the plan, and the obstacles in the plane."""
-    x, y = plane.axes(marks)
-    title, height = f"Tube in the plane of {plane.names[0]} and {plane.names[1]}", _height_of(plane, x, y)
-    chart = Chart(key=key, title=title, x=x, y=y, height=height)
-    chart.box((x.low, y.low), (x.high, y.high), "outside")
-    chart.box(*plane.safe, "safe", "safe set")
-    if len(plane.plan) and plane.tube is not None and np.isfinite(plane.tube).all():
-        across, up = WIDTH - LEFT - RIGHT, height - TOP - BOTTOM
-        fine = _FINE * np.array([(x.high - x.low) / across, (y.high - y.low) / up])
-        words = "tube" if proven else "tube, not proven to stay in the safe set"
-        chart.area(swept(plane.plan, plane.tube, fine), TUBE[proven], words)
-    if len(plane.plan) > 1:
-        chart.line(plane.plan, "plan", "plan")
-    shapes = [_shape(each, plane.names) for each in obstacles if set(each.states) == set(plane.names)]
-    for shape in shapes:
-        chart.area([shape], "obstacle", "obstacle")
-    return chart
-
-
-def _height_of(plane: Plane, x: Axis, y: Axis) -> int:
-    """The height at which a circle is round, if both states have one unit and neither side gets too short."""
-    if plane.units[0] != plane.units[1]:
-        return HEIGHT
-    height = round((WIDTH - LEFT - RIGHT) * (y.high - y.low) / (x.high - x.low)) + TOP + BOTTOM
-    return min(max(height, 200), 420)
+        near = all(is_near(shown[:, i], self.safe[i]) for i in (0, 1))
+        return [view(shown[:, i], self.safe[i], labels[i], near=near) for i in (0, 1)]
 
 
 def _shape(obstacle: ObstacleView, names: tuple[str, str]) -> Array:

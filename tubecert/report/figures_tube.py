@@ -15,7 +15,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.report import planned
 from tubecert.report.claimed import point
 from tubecert.report.figures_axes import Chart, Point
-from tubecert.report.figures_scene import Plane, labelled, over_time, scene
+from tubecert.report.figures_scene import Plane, labelled, over_time
 from tubecert.report.outline import tube_outline, widths
 
 
@@ -45,15 +45,20 @@ def plane_figure(result: Result, pair: tuple[int, int]) -> Chart:
     effective, samples = result.spec.effective, result.plan.samples
     names = effective.system.states
     x = np.array(() if samples is None else samples.x, dtype=float).reshape(-1, len(names))
-    safe = [_range(result.safe_set[names[i]]) for i in pair]
-    own = Plane.of(effective.system, pair, x, tube_outline(result, pair), safe)
+    own = Plane(
+        effective=effective,
+        pair=pair,
+        plan=x[:, pair],
+        tube=tube_outline(result, pair),
+        safe=(_range(result.safe_set[names[pair[0]]]), _range(result.safe_set[names[pair[1]]])),
+        proven=_is_proven(result),
+    )
     witnesses = [
         ((float(at.x[pair[0]]), float(at.x[pair[1]])), f"{reason.claim.title}: {point(result, at)}")
         for reason in result.reasons
         if (at := reason.at) is not None and len(at.x) > max(pair)
     ]
-    places = [place for place, _ in witnesses]
-    chart = scene(f"tube-{pair[0]}-{pair[1]}", own, effective.obstacles, places, proven=_is_proven(result))
+    chart = own.chart(f"tube-{pair[0]}-{pair[1]}", [place for place, _ in witnesses])
     if len(own.plan):
         words = "start of the plan" if len(own.plan) > 1 else "the plan, an equilibrium"
         chart.dot(own.plan[0], "start", words, tip="start of the plan")

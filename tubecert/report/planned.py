@@ -16,7 +16,6 @@ from tubecert.certificate.result import Result
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.model import TIME
-from tubecert.report.claimed import horizon
 from tubecert.report.outline import expression_of
 
 _SAMPLES = 201
@@ -50,7 +49,7 @@ def inputs(result: Result) -> tuple[Array, Array]:
 
 def end(result: Result) -> float:
     """The time up to which a plan is drawn, in s."""
-    return float(horizon(result) or _FOR_EVER)
+    return float(result.spec.effective.trajectory.horizon or _FOR_EVER)
 
 
 def _of_time(result: Result, texts: Sequence[str]) -> tuple[Array, Array]:

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 from tubecert.certificate.result import InputData, Result, TubeData
 from tubecert.digits import UNKNOWN, down, end, near, percent, short, up
-from tubecert.report.claimed import horizon, radius
 from tubecert.report.gains import NAMES
 from tubecert.trajectory.hermite import ends_of_pieces
 from tubecert.verdict import Verdict
@@ -72,7 +71,7 @@ def extent(result: Result) -> str:
     """How far the state may be from the plan: the radius, or the half-widths of a tube measured by the metric."""
     tube = result.tube
     if is_radius(result) or tube is None or tube.half_widths is None:
-        return f"{up(radius(result))} {_unit(result)}".rstrip()
+        return f"{up(None if tube is None else tube.rho)} {_unit(result)}".rstrip()
     return f"the half-widths {half_widths(result, tube.half_widths)}"
 
 
@@ -157,7 +156,7 @@ def half_widths(result: Result, widths: Mapping[str, float], sign: str = "") -> 
 
 def long_run(result: Result) -> Iterator[tuple[str, str]]:
     """How near the plan the state is when the initial error has died out, for each certificate that holds."""
-    if horizon(result) is not None:
+    if result.spec.effective.trajectory.horizon is not None:
         return
     for key, words in NAMES.items():
         section = result.sections.get(key)
