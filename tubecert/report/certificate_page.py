@@ -106,7 +106,7 @@ def _meaning(result: Result) -> str:
             return (
                 f"With this metric, {loops}, the state stays within {reach.extent(result)} of "
                 f"{claimed.plan_words(result)} {claimed.span(result)} if it starts {claimed.start_words(result)}, "
-                "under the assumptions below."
+                "under the assumptions of the certificate."
             )
         case Verdict.REFUTED if result.reason and isinstance(result.reason.claim, InputWithinLimits):
             return "The plan itself asks more of an input than its limits allow, whatever the gains."
