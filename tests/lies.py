@@ -17,7 +17,7 @@ from tubecert.conditions.problem import TubeProblem, Wind
 from tubecert.conditions.rates import RateRecipe
 from tubecert.conditions.theorem import Asked
 from tubecert.enclosure.constant import Constant
-from tubecert.search.distance import recipe_at
+from tubecert.search.distance import recipes_at
 from tubecert.search.proposers import PROPOSERS
 
 F = Fraction
@@ -67,7 +67,7 @@ def honest(name: str, kind: str) -> Any:
     if kind == "0":
         return NoGains()
     if kind == "B":
-        return recipe_at(problem, omega, Gamma, g)
+        return recipes_at(problem, [(omega, Gamma, g)])[0]
     R_H = problem.projection_radius
     return RateRecipe(bandwidth=omega, adaptation_rate=Gamma, predictor_gain=g, projection_radius=R_H)
 

@@ -193,19 +193,15 @@ def _about(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> 
     A curve has the projection that is printed for a pair alone; what is around a pair differs in its bandwidth alone.
     """
 
-    def kept(recipe: R | None) -> R | None:
-        return recipe if recipe is not None and theorem.states(problem, recipe) else None
-
     def those(recipes: Iterable[R], *names: str) -> tuple[R, ...]:
         return tuple(r for r in recipes if theorem.states(problem, r) and _same(pair, r, *names))
 
-    decisive = kept(proposal.decisive)
+    decisive = proposal.decisive if theorem.states(problem, proposal.decisive) else None
     beside = {role: r for role, r in proposal.beside.items() if theorem.states(problem, r)}
     pair = next((r for r in (decisive, *beside.values()) if r is not None), None)
     return replace(
         proposal,
         decisive=decisive,
-        hopeless=kept(proposal.hopeless),
         beside=beside,
         curve=those(proposal.curve, "projection_radius"),
         around=those(proposal.around, *_BESIDE_BANDWIDTH),
@@ -218,14 +214,9 @@ def _decided(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -
     blocking = _against(item.margin for item in blocked)
     if blocked and (proposal.decisive is None or blocking is Verdict.REFUTED):
         return Judgement(verdict=blocking, shortfalls=blocked)
-    at = proposal.hopeless if proposal.decisive is None else proposal.decisive
-    if at is None:
-        return Judgement(verdict=Verdict.UNDECIDED, shortfalls=NOTHING_FOUND)
-    checked = check(problem, at)
     if proposal.decisive is None:
-        # gains that stand for others can refute them, and prove nothing of them
-        against = _against(checked.margins.values())
-        return Judgement(verdict=against, shortfalls=_failing(checked) or NOTHING_FOUND)
+        return Judgement(verdict=Verdict.UNDECIDED, shortfalls=NOTHING_FOUND)
+    checked = check(problem, proposal.decisive)
     if isinstance(checked, Proof):
         return Judgement(verdict=Verdict.CERTIFIED, decisive=checked, role=proposal.role)
     return Judgement(

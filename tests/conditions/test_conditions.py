@@ -31,7 +31,7 @@ def recipe(omega: str, Gamma: str, g: str = "3.5", R_H: str = "0.35") -> RateRec
 
 
 def distance_recipe(problem: TubeProblem, omega: str = "60", Gamma: str = "1e5"):
-    return distance.recipe_at(problem, Fraction(omega), Fraction(Gamma), Fraction("3.5"))
+    return distance.recipes_at(problem, [(Fraction(omega), Fraction(Gamma), Fraction("3.5"))])[0]
 
 
 def test_a_comparison_that_cannot_be_decided_yields_both_branches():

@@ -21,7 +21,7 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.rates import RateRecipe
 from tubecert.conditions.theorem import Proposal
 from tubecert.kernel import Proof, check, judge, theorem_of
-from tubecert.search.distance import recipe_at
+from tubecert.search.distance import recipes_at
 from tubecert.verdict import Verdict
 
 F = Fraction
@@ -99,7 +99,7 @@ def test_a_recipe_for_a_milder_problem_is_certified_where_it_proves_the_theorem_
 def test_margins_of_any_size_are_those_of_the_theory(omega):
     for problem in problems():
         gains = at(problem, "A", omega)
-        own = recipe_at(problem, gains.bandwidth, gains.adaptation_rate, gains.predictor_gain)
+        own = recipes_at(problem, [(gains.bandwidth, gains.adaptation_rate, gains.predictor_gain)])[0]
         for recipe in (NoGains(), gains, own):
             true = oracle.margins(problem, recipe)
             for claim, margin in check(problem, recipe).margins.items():
@@ -119,7 +119,6 @@ def test_a_recipe_of_another_kind_proves_nothing(kind):
         )
         assert (judgement.verdict is Verdict.CERTIFIED) == (kind == other)
         assert bool(judgement.beside) == bool(judgement.curve) == (kind == other)
-        assert judge(problem, theorem, Proposal(hopeless=recipe)).verdict is Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -242,19 +241,14 @@ def test_margins_around_are_about_the_rate_and_the_predictor_that_they_are_print
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", "AB")
 def test_gains_are_refuted_where_nothing_serves_with_them(kind):
-    """Whether as the ones that decide, or as those that stand for others."""
     refuted = 0
     for name in ("every term alive", "a wind, B turns") if kind == "B" else ("every term alive",):
         problem = PROBLEMS[name][0]
         for words, lie in told(honest(name, kind), kind):
-            for proposal in (Proposal(decisive=lie), Proposal(hopeless=lie)):
-                found = judge(problem, theorem_of(KINDS[kind]), proposal).verdict
-                if found is Verdict.REFUTED:
-                    refuted += 1
-                    assert oracle.best(problem, lie) <= 0, (name, words)
-                elif proposal.hopeless is not None:
-                    assert found is Verdict.UNDECIDED
-    assert refuted > 20
+            if judge(problem, theorem_of(KINDS[kind]), Proposal(decisive=lie)).verdict is Verdict.REFUTED:
+                refuted += 1
+                assert oracle.best(problem, lie) <= 0, (name, words)
+    assert refuted > 10
 
 
 @pytest.mark.slow
@@ -262,7 +256,7 @@ def test_a_companion_tells_a_radius_where_it_is_a_proof_at_the_same_gains():
     name = "every term alive"
     problem, recipe, theorem = PROBLEMS[name][0], honest(name, "A"), theorem_of(RateRecipe)
     gains = recipe.bandwidth, recipe.adaptation_rate, recipe.predictor_gain
-    companion, kept = recipe_at(problem, *gains), 0
+    companion, kept = recipes_at(problem, [gains])[0], 0
     for words, lie in (("the truth", companion), *told(companion, "B")):
         radius = judge(problem, theorem, Proposal(decisive=recipe, companion=lie)).ultimate_radius
         same = all(getattr(lie, name) == getattr(recipe, name) for name in NUMBERS["A"])

@@ -18,8 +18,9 @@ from tubecert.pipeline.certification import answer
 from tubecert.pipeline.certification import judge as judge_gains
 from tubecert.pipeline.certification import result as result_of_answer
 from tubecert.recheck.run import recheck
-from tubecert.search.elasticities import elasticities_26
+from tubecert.search.elasticities import elasticities
 from tubecert.search.proposers import PROPOSERS
+from tubecert.search.rates import RateSearch
 from tubecert.spec import load
 
 CONFIG = Path(__file__).parents[2] / "configs" / "three_state.yaml"
@@ -70,7 +71,7 @@ def test_a_search_that_lies_certifies_nothing(key, bounded, honest, monkeypatch)
     [
         lambda problem, least: {"h": float("inf"), "B": float("nan")},
         lambda problem, least: {"h": -1e300, "h_t": 1e300},
-        lambda problem, least: {k: -v for k, v in elasticities_26(problem, least).items()},
+        lambda problem, least: {k: -v for k, v in elasticities(RateSearch, problem, least).items()},
     ],
     ids=["no numbers", "absurd", "turned round"],
 )

@@ -31,7 +31,7 @@ from tubecert.enclosure.interval import Interval
 from tubecert.recheck import conditions
 from tubecert.recheck.balls import exact
 from tubecert.recheck.kinds import alone as own_alone
-from tubecert.search.distance import recipe_at
+from tubecert.search.distance import recipes_at
 
 F = Fraction
 WIND = ("push", "size", "explained")
@@ -66,7 +66,7 @@ def drawn(rng: np.random.Generator) -> Point:
     }
     g = problem.predictor_gain or F(int(10 ** rng.uniform(0, 3)), 10)
     at = RateRecipe(predictor_gain=g, projection_radius=problem.projection_radius, **gains)
-    own = recipe_at(problem, at.bandwidth, at.adaptation_rate, g)
+    own = recipes_at(problem, [(at.bandwidth, at.adaptation_rate, g)])[0]
     lie = [None, *LIES][rng.integers(1 + len(LIES))]
     if lie == "projection_radius":
         at = replace(at, projection_radius=at.projection_radius * LESS)

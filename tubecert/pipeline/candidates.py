@@ -19,7 +19,8 @@ from tubecert.pipeline.certification import defect_share, mending, plan, tube
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
 from tubecert.pipeline.width import Measure
-from tubecert.search.proposers import LEAST, PROPOSERS, Explained
+from tubecert.search.gains import LEAST
+from tubecert.search.proposers import PROPOSERS, Explained
 from tubecert.stages.bounded import Enclosed, enclose, half_widths, unmet
 from tubecert.stages.judged import deciding
 from tubecert.stages.metric import ProvenMetric, prove_metric

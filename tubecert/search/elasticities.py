@@ -9,41 +9,30 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 from tubecert.bounds.constants import TABLE, Constant
 from tubecert.conditions.arithmetic import Array
-from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import FIELDS, Numbers, TubeProblem
-from tubecert.conditions.rates import RateRecipe, rate_terms
-from tubecert.search.bandwidths import RateSearch
-from tubecert.search.distance import least_rate
-from tubecert.search.rates import gains_along, needed_rate
+from tubecert.conditions.theorem import LoopGains
+from tubecert.search.gains import GainSearch
 
 _STEP = 1e-4
 
 
-def elasticities_distance(problem: TubeProblem, least: DistanceRecipe | None) -> dict[str, float]:
-    """By constant, for certificate B's gains of least Gamma; empty if there are none."""
-    if least is None:
-        return {}
-    n, lanes = _perturbed(problem)
-    omega = np.full(lanes, float(least.bandwidth))
-    return _slopes(least_rate(problem, n, omega)[0])
+def elasticities(
+    search: type[GainSearch[Any]], problem: TubeProblem, least: LoopGains | None
+) -> dict[str, float]:
+    """By constant, for gains of least Gamma; empty if there are none.
 
-
-def elasticities_26(problem: TubeProblem, least: RateRecipe | None) -> dict[str, float]:
-    """By constant, for certificate A's gains of least Gamma; empty if there are none.
-
-    Where (26a) fixes the bandwidth of these gains, the constants in (26a) act through the bandwidth too: not counted.
+    Where (26a) fixes the bandwidth of certificate A's, the constants in (26a) act through it too: not counted.
     """
     if least is None:
         return {}
     n, lanes = _perturbed(problem)
-    s = RateSearch(problem=problem, n=n, terms=rate_terms(n))
-    omega = np.full(lanes, float(least.bandwidth))
-    return _slopes(needed_rate(s, omega, gains_along(s, omega)))
+    return _slopes(search(problem, n).needed(np.full(lanes, float(least.bandwidth))))
 
 
 def _perturbed(problem: TubeProblem) -> tuple[Numbers[Array], int]:

@@ -5,25 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, Final, Protocol
+from functools import partial
+from typing import Any, Final
 
 from tubecert.conditions.alone import NoGains
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.rates import RateRecipe
-from tubecert.conditions.theorem import Asked, Proposal
-from tubecert.search.distance import least_distance, propose_distance
-from tubecert.search.elasticities import elasticities_26, elasticities_distance, halving
-from tubecert.search.rates import least_rates, propose_rates
-
-LEAST = "least_adaptation"
-
-
-class _Rated(Protocol):
-    """Gains with an adaptation rate."""
-
-    @property
-    def adaptation_rate(self) -> Fraction: ...
+from tubecert.conditions.theorem import Asked, LoopGains, Proposal
+from tubecert.search.distance import DistanceSearch
+from tubecert.search.elasticities import elasticities, halving
+from tubecert.search.gains import LEAST, GainSearch
+from tubecert.search.rates import RateSearch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +28,16 @@ class Proposer:
 
     propose: Callable[[TubeProblem, Asked], Proposal[Any]]
     slopes: Callable[[TubeProblem, Any], dict[str, float]] | None = None
-    least: Callable[[TubeProblem], _Rated | None] | None = None
+    least: Callable[[TubeProblem], LoopGains | None] | None = None
+
+    @classmethod
+    def of(cls, search: type[GainSearch[Any]]) -> Proposer:
+        """By the search of a theorem's gains."""
+        return cls(
+            propose=lambda problem, asked: search(problem).propose(asked),
+            slopes=partial(elasticities, search),
+            least=lambda problem: search(problem).least(),
+        )
 
     def explain(self, problem: TubeProblem, at: Callable[[str], Any]) -> Explained:
         """What the gains depend on, `at` being the recipes by role; no claim rests on these numbers."""
@@ -59,6 +61,6 @@ class Explained:
 
 PROPOSERS: Final[Mapping[type, Proposer]] = {
     NoGains: Proposer(propose=lambda problem, asked: Proposal(decisive=NoGains(), role="feedback")),
-    RateRecipe: Proposer(propose=propose_rates, slopes=elasticities_26, least=least_rates),
-    DistanceRecipe: Proposer(propose=propose_distance, slopes=elasticities_distance, least=least_distance),
+    RateRecipe: Proposer.of(RateSearch),
+    DistanceRecipe: Proposer.of(DistanceSearch),
 }

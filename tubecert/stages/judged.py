@@ -94,9 +94,6 @@ def judge_all(bounded: Bounded, proposals: Mapping[type, Proposal[Any]]) -> Judg
 def _answering(options: Options, proposal: Proposal[Any]) -> Proposal[Any]:
     """A proposal without what would decide, where it is about other gains than were asked for."""
     wanted = {"bandwidth": options.bandwidth, "adaptation_rate": options.adaptation_rate}
-
-    def kept(recipe: Any) -> Any:
-        same = all(value in (None, getattr(recipe, name, value)) for name, value in wanted.items())
-        return recipe if same else None
-
-    return replace(proposal, decisive=kept(proposal.decisive), hopeless=kept(proposal.hopeless))
+    own = proposal.decisive
+    same = all(value in (None, getattr(own, name, value)) for name, value in wanted.items())
+    return proposal if same else replace(proposal, decisive=None)

@@ -30,7 +30,8 @@ class Options:
 
     def asked(self, *, curve: bool) -> Asked:
         """The gains that are asked for; with `curve`, what else is possible beside them."""
-        return Asked(bandwidth=self.bandwidth, adaptation_rate=self.adaptation_rate, curve=curve)
+        pair = self.bandwidth, self.adaptation_rate
+        return Asked(gains=None if pair[0] is None or pair[1] is None else (pair[0], pair[1]), curve=curve)
 
 
 def overridden(spec: Spec, options: Options) -> Spec:
