@@ -52,13 +52,12 @@ class Coordinates:
     @cached_property
     def gram(self) -> Rows:
         """S'S: |z|^2 = x'S'S x."""
-        columns = tuple(zip(*self.rows, strict=True))
-        return tuple(tuple(_dot(a, b) for b in columns) for a in columns)
+        return product(turned(self.rows), self.rows)
 
     @cached_property
     def spread(self) -> Rows:
         """S^-1 S^-T, the inverse of S'S: x_i reaches sqrt(spread_ii) where |z| <= 1."""
-        return tuple(tuple(_dot(a, b) for b in self.inverse) for a in self.inverse)
+        return product(self.inverse, turned(self.inverse))
 
     @cached_property
     def S(self) -> Matrix:
@@ -88,8 +87,18 @@ def inverse(rows: Sequence[Sequence[Fraction]]) -> Rows:
     return tuple(tuple(row[n:]) for row in work)
 
 
-def _dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
-    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
+def turned(rows: Rows) -> Rows:
+    """The transpose of a rational matrix."""
+    return tuple(zip(*rows, strict=True))
+
+
+def product(a: Rows, b: Rows) -> Rows:
+    """The product of rational matrices, exactly."""
+    columns = turned(b)
+    return tuple(
+        tuple(sum((x * y for x, y in zip(row, own, strict=True)), Fraction(0)) for own in columns)
+        for row in a
+    )
 
 
 @dataclass(frozen=True)

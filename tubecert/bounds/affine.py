@@ -14,10 +14,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import sub
 
 import numpy as np
 
-from tubecert.coordinates import Coordinates, Rows, inverse
+from tubecert.coordinates import Coordinates, Rows, inverse, product, turned
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import midrad, norm_bound, spectral_norm, spectral_norm_midrad
 from tubecert.enclosure.objective import Estimate, Target, estimate_of
@@ -69,7 +70,7 @@ class NormOverRest:
         E = _root_above(back)
         if E is None:
             raise ValueError("the ellipsoid is too thin for floats")
-        C = [[-_dot(row, [S.gram[i][j] for i in rest]) for j in own] for row in back]
+        C = product(back, tuple(tuple(-S.gram[i][j] for j in own) for i in rest))
         offset = [symbol(names[j]) - centre[j] for j in own]
         values = {
             names[i]: sum((constant(c) * y for c, y in zip(row, offset, strict=True) if c), start=centre[i])
@@ -80,7 +81,7 @@ class NormOverRest:
             [column(substitute([row[0] for row in v], values)), column(offset or [ZERO])]
         )
         self.variables = self._function.variables
-        self._H = midrad(enclosed(tuple(tuple(_dot(k, e) for e in zip(*E, strict=True)) for k in parts.K)))
+        self._H = midrad(enclosed(product(parts.K, E)))
         self._own, self._rest = [names[j] for j in own], [names[i] for i in rest]
         self._place = MatrixFunction([column([values[name] for name in self._rest])])
         self._E = np.array([[float(value) for value in row] for row in E])
@@ -195,12 +196,6 @@ def _root_above(spread: Rows) -> Rows | None:
     except np.linalg.LinAlgError:
         return None
     E = tuple(tuple(Fraction(float(value)) for value in row) for row in proposed)
-    more = tuple(
-        tuple(_dot(a, b) - known for b, known in zip(E, row, strict=True))
-        for a, row in zip(E, spread, strict=True)
-    )
+    square = product(E, turned(E))
+    more = tuple(tuple(map(sub, own, known)) for own, known in zip(square, spread, strict=True))
     return E if is_positive_semidefinite(more) else None
-
-
-def _dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
-    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))

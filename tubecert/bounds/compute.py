@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal, Protocol, TypeVar
 
@@ -39,9 +39,9 @@ class Radius:
     """
 
     rho: Fraction
-    lower: Constant | None
-    upper: Constant | None
-    contained: Containment
+    lower: Constant | None = None
+    upper: Constant | None = None
+    contained: Containment = field(default_factory=Containment)
     obstacle: Obstacle | None = None
     sides: tuple[Fraction, ...] | None = None
 
@@ -59,44 +59,43 @@ def least_radius(
     With declared a and A (proven on the safe set) there is nothing to iterate.
     """
 
-    def needed(a: Constant, A: Constant) -> Fraction | None:
-        """The right-hand side, None if it is beyond all floats."""
-        if not a.below > 0:
-            return None
-        if not offset.hi > 0:
-            return width
-        with np.errstate(all="ignore"):
-            overshoot = float((sqrt(Interval.exact(A.above) / Interval.exact(a.below)) * offset).hi)
-        return decimal_above(Fraction(overshoot) + width) if math.isfinite(overshoot) else None
-
     def check(rho: Fraction) -> Containment:
         return containment(suprema.plan, rho, suprema.model.states, safe_set, suprema.effort)
 
-    beyond: Obstacle = "out_of_range"
-    nowhere = Containment()
     if declared is not None:
-        given = needed(*declared)
+        given = overshoot(*declared, offset, width)
         if given is None:
-            return Radius(rho=width, lower=None, upper=None, contained=nowhere, obstacle=beyond)
+            return Radius(rho=width, obstacle="out_of_range")
         return Radius(rho=given, lower=declared[0], upper=declared[1], contained=check(given))
     if not math.isfinite(offset.hi):
-        return Radius(rho=width, lower=None, upper=None, contained=nowhere, obstacle=beyond)
+        return Radius(rho=width, obstacle="out_of_range")
     rho = decimal_above(Fraction(float(offset.hi)) + width)
     contained = check(rho)
     for _ in range(_ROUNDS):
         contained = check(rho)
         if contained.verdict is not Verdict.CERTIFIED:
-            return Radius(rho=rho, lower=None, upper=None, contained=contained)
+            return Radius(rho=rho, contained=contained)
         a, A = suprema.with_radius(rho).metric_bounds()
         if not (a.below > 0 and math.isfinite(A.above)):
-            return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle="metric_unbounded")
-        right = needed(a, A)
+            return Radius(rho=rho, contained=contained, obstacle="metric_unbounded")
+        right = overshoot(a, A, offset, width)
         if right is None:
-            return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle=beyond)
+            return Radius(rho=rho, contained=contained, obstacle="out_of_range")
         if right <= rho:
             return Radius(rho=rho, lower=a, upper=A, contained=contained)
         rho = decimal_above(right * _INFLATION) if right < rho * _CLOSE else right
-    return Radius(rho=rho, lower=None, upper=None, contained=contained, obstacle="not_settled")
+    return Radius(rho=rho, contained=contained, obstacle="not_settled")
+
+
+def overshoot(a: Constant, A: Constant, offset: Interval, width: Fraction) -> Fraction | None:
+    """sqrt(A/a) offset + width, None if it is beyond all floats, theory 2.11."""
+    if not a.below > 0:
+        return None
+    if not offset.hi > 0:
+        return width
+    with np.errstate(all="ignore"):
+        value = float((sqrt(Interval.exact(A.above) / Interval.exact(a.below)) * offset).hi)
+    return decimal_above(Fraction(value) + width) if math.isfinite(value) else None
 
 
 class Recall(Protocol):

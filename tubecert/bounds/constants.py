@@ -6,9 +6,8 @@ constant is a line here, what bounds it (`bounds.compute`), its name in `conditi
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import Field, dataclass, field, fields
-from typing import Literal
+from dataclasses import dataclass, field, fields, replace
+from typing import ClassVar, Literal, Self
 
 from tubecert.claims import family
 from tubecert.enclosure.constant import Constant, Witness
@@ -46,26 +45,43 @@ def _of(
     number: str | None = None,
     given: bool = False,
 ) -> dict[str, Meaning]:
-    """The registry entry of a constant; in formulas it has its symbol for a name, unless said otherwise."""
-    return {
-        "meaning": Meaning(
-            symbol=symbol,
-            equation=equation,
-            unit=unit,
-            words=words,
-            side=side,
-            number=symbol if number is None else number,
-            given=given,
-        )
-    }
+    """The meaning of a constant; in formulas it has its symbol for a name, unless said otherwise."""
+    number = symbol if number is None else number
+    own = Meaning(
+        symbol=symbol, equation=equation, unit=unit, words=words, side=side, number=number, given=given
+    )
+    return {"meaning": own}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BoundConstants:
-    """Every constant of certificates 0, A and B over O(rho), each an enclosure.
+class Constants:
+    """Constants over a tube, each an enclosure, with their meanings; `prefix` is that of their names in a certificate.
 
     The units are those of the states and inputs of the specification; "1" is dimensionless.
     """
+
+    prefix: ClassVar[str] = ""
+
+    def printable(self) -> Self:
+        """The same with every enclosure widened to printable bounds."""
+        return replace(self, **{item.name: getattr(self, item.name).printable() for item in fields(self)})
+
+    def items(self) -> list[tuple[str, Constant, Meaning]]:
+        """`(name, value, meaning)` of every constant, by its name in a certificate."""
+        return [
+            (self.prefix + item.name, getattr(self, item.name), item.metadata["meaning"])
+            for item in fields(self)
+        ]
+
+    @classmethod
+    def table(cls) -> dict[str, Meaning]:
+        """What each of them is, by its name in a certificate."""
+        return {cls.prefix + item.name: item.metadata["meaning"] for item in fields(cls)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoundConstants(Constants):
+    """Every constant of certificates 0, A and B over O(rho)."""
 
     lower: Constant = field(
         metadata=_of("a", "CCM_1", "1", "smallest eigenvalue of the metric M", side="below", given=True)
@@ -109,51 +125,27 @@ class BoundConstants:
         metadata=_of("delta", "theory 3", "d/s", "the plan defect measured by the metric on the plan")
     )
 
-    def printable(self) -> BoundConstants:
-        """The same with every enclosure widened to printable bounds."""
-        return BoundConstants(**{name: value.printable() for name, value, _ in self.items()})
-
-    def items(self) -> list[tuple[str, Constant, Meaning]]:
-        """`(name, value, meaning)` of every constant, in the order of the table."""
-        return [(name, getattr(self, name), meaning) for name, meaning in TABLE.items()]
-
-
-def table_of(constants: Iterable[Field[object]]) -> dict[str, Meaning]:
-    """What each of the fields of a class of constants is; what has no meaning of its own is no constant."""
-    return {item.name: item.metadata["meaning"] for item in constants if item.metadata}
-
-
-TABLE: dict[str, Meaning] = table_of(fields(BoundConstants))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WindConstants:
+class WindConstants(Constants):
     """What E w does for |w| <= 1 (theory 7): how hard it pushes, how fast it moves the state, what of it B explains.
 
     Where w has a rate, E stands for (I - B B^+) E, and B^+ E w is a part of h.
     """
 
+    prefix = "wind_"
     push: Constant = field(
         metadata=_of("beta_w", "theory 7", "d/s", "how fast the wind lengthens the geodesic at most, per |w|")
     )
     size: Constant = field(metadata=_of("D_E", "theory 7", "x/s", "sup |E|"))
     explained: Constant = field(metadata=_of("eps_w", "theory 7", "u", "sup |B^+ E|"))
 
-    def printable(self) -> WindConstants:
-        """The same with every enclosure widened to printable bounds."""
-        return WindConstants(**{item.name: getattr(self, item.name).printable() for item in fields(self)})
-
-    def items(self) -> list[tuple[str, Constant, Meaning]]:
-        """`(name, value, meaning)` of each, by its name in a certificate."""
-        return [
-            (f"wind_{name}", getattr(self, name), meaning) for name, meaning in table_of(fields(self)).items()
-        ]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ResidualConstants:
+class ResidualConstants(Constants):
     """What parameters in boxes leave of f that no input reaches, r = (I - B B^+)(f(x, theta) - f0(x)) (theory 7)."""
 
+    prefix = "residual_"
     push: Constant = field(
         metadata=_of(
             "beta_r", "theory 7", "d/s", "what unknown parameters do to the distance beside the inputs"
@@ -163,22 +155,9 @@ class ResidualConstants:
         metadata=_of("D_r", "theory 7", "x/s", "sup of what unknown parameters do beside the inputs")
     )
 
-    def printable(self) -> ResidualConstants:
-        """The same with every enclosure widened to printable bounds."""
-        return ResidualConstants(push=self.push.printable(), size=self.size.printable())
 
-    def items(self) -> list[tuple[str, Constant, Meaning]]:
-        """`(name, value, meaning)` of each, by its name in a certificate."""
-        return [
-            (f"residual_{name}", getattr(self, name), meaning)
-            for name, meaning in table_of(fields(self)).items()
-        ]
-
-
-WIND: dict[str, Meaning] = {
-    **{f"wind_{name}": meaning for name, meaning in table_of(fields(WindConstants)).items()},
-    **{f"residual_{name}": meaning for name, meaning in table_of(fields(ResidualConstants)).items()},
-}
+TABLE: dict[str, Meaning] = BoundConstants.table()
+WIND: dict[str, Meaning] = WindConstants.table() | ResidualConstants.table()
 
 DERIVED: dict[str, Meaning] = {
     name: Meaning(symbol=symbol, equation=equation, unit=unit, words=words)

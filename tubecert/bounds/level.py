@@ -12,9 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-import numpy as np
-
-from tubecert.bounds.compute import Box, Radius
+from tubecert.bounds.compute import Box, Radius, overshoot
 from tubecert.bounds.constants import Constant
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.constant import decimal_above, printable_above
@@ -52,12 +50,12 @@ def least_level(
     """
     least = Fraction(float(offset.hi)) + width if math.isfinite(offset.hi) else width
     now = proposed if proposed.rho >= least else proposed.scaled(least / proposed.rho)
-    found = _nowhere(now.rho)
+    found = Radius(rho=now.rho)
     for k in range(_ROUNDS):
         found = settled(suprema, safe_set, now)
         if found.lower is None or found.upper is None or found.sides is None:
             return found
-        right = _overshoot(found.lower, found.upper, offset, width)
+        right = overshoot(found.lower, found.upper, offset, width)
         if right is None:
             return replace(found, lower=None, upper=None, obstacle="out_of_range")
         if right <= found.rho:
@@ -76,7 +74,7 @@ def greatest_level(
     one; none if it is a half-width that is asked for which does not fit.
     """
     now, best = proposed, None
-    found = _nowhere(now.rho)
+    found = Radius(rho=now.rho)
     for k in range(_ROUNDS):
         found = settled(suprema, safe_set, now)
         if found.lower is None or found.sides is None:
@@ -118,14 +116,14 @@ def settled(suprema: Suprema, safe_set: Box, proposed: Proposed) -> Radius:
     for k in range(_ROUNDS):
         contained = containment(suprema.plan, sides, suprema.model.states, safe_set, suprema.effort)
         if contained.verdict is not Verdict.CERTIFIED:
-            return best or Radius(rho=rho, lower=None, upper=None, contained=contained, sides=sides)
+            return best or Radius(rho=rho, contained=contained, sides=sides)
         tube = suprema.with_radius(rho, sides)
         a, A = tube.metric_bounds()
         if not (a.below > 0 and math.isfinite(A.above)):
-            return replace(_nowhere(rho), contained=contained, obstacle="metric_unbounded")
+            return Radius(rho=rho, contained=contained, obstacle="metric_unbounded")
         needed = _half_widths(tube, a, rho)
         if needed is None:
-            return replace(_nowhere(rho), contained=contained, obstacle="out_of_range")
+            return Radius(rho=rho, contained=contained, obstacle="out_of_range")
         fits = all(least <= side for least, side in zip(needed, sides, strict=True))
         if fits:
             best = Radius(rho=rho, lower=a, upper=A, contained=contained, sides=sides)
@@ -134,7 +132,7 @@ def settled(suprema: Suprema, safe_set: Box, proposed: Proposed) -> Radius:
         growth = 1 + _added(k)
         raised = tuple(_printed(least * growth) for least in needed)
         sides = raised if fits else tuple(max(pair) for pair in zip(raised, sides, strict=True))
-    return best or replace(_nowhere(rho), obstacle="not_settled")
+    return best or Radius(rho=rho, obstacle="not_settled")
 
 
 def _of_outputs(suprema: Suprema, found: Radius, asked: Sequence[Fraction | None]) -> tuple[Fraction, ...]:
@@ -156,15 +154,6 @@ def _half_widths(tube: Suprema, a: Constant, rho: Fraction) -> tuple[Fraction, .
     return tuple(map(Fraction, ends)) if all(map(math.isfinite, ends)) else None
 
 
-def _overshoot(a: Constant, A: Constant, offset: Interval, width: Fraction) -> Fraction | None:
-    """sqrt(A/a) offset + width, None if it is beyond all floats, theory 2.11."""
-    if not offset.hi > 0:
-        return width
-    with np.errstate(all="ignore"):
-        value = float((sqrt(Interval.exact(A.above) / Interval.exact(a.below)) * offset).hi)
-    return decimal_above(Fraction(value) + width) if math.isfinite(value) else None
-
-
 def _added(k: int) -> Fraction:
     return min(_MOST, Fraction(4**k) * _LEAST)
 
@@ -172,7 +161,3 @@ def _added(k: int) -> Fraction:
 def _printed(value: Fraction) -> Fraction:
     """What a certificate will say of a half-width, read as the exact decimal that it shows."""
     return Fraction(repr(printable_above(value)))
-
-
-def _nowhere(rho: Fraction) -> Radius:
-    return Radius(rho=rho, lower=None, upper=None, contained=Containment())

@@ -15,6 +15,7 @@ from math import isfinite
 import numpy as np
 
 from tubecert.bounds.searches import Searches
+from tubecert.coordinates import Rows, product
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.enclosure.linalg import midrad, norm_bound, spectral_norm_midrad
@@ -48,15 +49,14 @@ def linear_bound(suprema: Searches, v: Matrix) -> float | None:
     offset = [symbol(name) - constant(q) for name, q in zip(model.states, centre, strict=True)]
     straight = multiply(constants(K), column(offset))
     rest = [e - constant(q) - row[0] for e, q, row in zip(entries, v0, straight, strict=True)]
-    return _bound(suprema, v0, _in_z(suprema, K), rest)
+    S = suprema.coordinates
+    return _bound(suprema, v0, K if S is None else product(K, S.inverse), rest)
 
 
-def _bound(
-    suprema: Searches, v0: list[Fraction], H: list[list[Fraction]], rest: list[Expression]
-) -> float | None:
+def _bound(suprema: Searches, v0: list[Fraction], H: Rows, rest: list[Expression]) -> float | None:
     """(1.9): g and K S^-1 over a and b with a^2 + b^2 <= 1, decided in exact arithmetic, and the remainders."""
     reach = Interval.exact(suprema.rho)
-    mid, rad = midrad(enclosed(tuple(map(tuple, H))) * reach)
+    mid, rad = midrad(enclosed(H) * reach)
     size = float(spectral_norm_midrad(mid, rad).hi)
     length = float(np.linalg.norm([float(q) for q in v0]))
     if any(v0):
@@ -78,19 +78,9 @@ def _remainder(suprema: Searches, e: Expression, effort: Effort) -> float:
     return 0.0 if objective.is_zero else suprema.over_tube("remainder", objective, effort).above
 
 
-def _in_z(suprema: Searches, K: list[list[Fraction]]) -> list[list[Fraction]]:
-    """K S^-1, exactly, as (1.9) has it."""
-    if suprema.coordinates is None:
-        return K
-    columns = list(zip(*suprema.coordinates.inverse, strict=True))
-    return [
-        [sum((p * q for p, q in zip(row, col, strict=True)), Fraction(0)) for col in columns] for row in K
-    ]
-
-
 def _proposed(
     suprema: Searches, entries: list[Expression], centre: Array
-) -> tuple[list[Fraction], list[list[Fraction]]] | None:
+) -> tuple[list[Fraction], Rows] | None:
     """v at the centre, and in column j its mean slope on the way to where x_j is largest and least; t is 0."""
     n, states = len(centre), suprema.model.states
     spread = np.eye(n) if suprema.coordinates is None else np.array(suprema.coordinates.spread, dtype=float)
@@ -105,7 +95,7 @@ def _proposed(
     K, v0 = means[np.arange(n), :, np.arange(n)].T, own[0, :, 0]
     if not (np.all(np.isfinite(K)) and np.all(np.isfinite(v0))):
         return None
-    return [_short(e) for e in v0], [[_short(e) for e in row] for row in K]
+    return [_short(e) for e in v0], tuple(tuple(map(_short, row)) for row in K)
 
 
 def _short(value: float) -> Fraction:

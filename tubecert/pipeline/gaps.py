@@ -9,13 +9,13 @@ chooses gaps; every enclosure is proven at any gap, and what the gains are is fo
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from math import inf, isfinite, log, sqrt
 from typing import Final, TypeVar
 
-from tubecert.bounds.constants import TABLE, WIND, Constant
+from tubecert.bounds.constants import TABLE, WIND, Constant, Constants
 from tubecert.conditions.alone import supremum
 from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.theorem import Asked
@@ -28,7 +28,7 @@ from tubecert.stages.judged import deciding
 from tubecert.stages.question import Question
 from tubecert.stages.tube import TubeFound
 
-R = TypeVar("R")
+R = TypeVar("R", bound=Constants)
 _COARSE: Final = Fraction(1, 5)
 _LEAST: Final = Fraction(1, 10**5)
 _LEAST_UNDECIDED: Final = Fraction(1, 10**4)  # where there are no gains yet, and perhaps never will be
@@ -171,23 +171,20 @@ def _constants(problem: TubeProblem) -> Iterator[tuple[str, Constant]]:
 def _lowered(problem: TubeProblem, least: Mapping[str, float]) -> TubeProblem:
     """The problem with constants as low as they may turn out to be."""
 
-    def of(record: R, names: Iterable[str], prefix: str = "") -> R:
-        own: dict[str, Constant] = {name: getattr(record, name) for name in names if prefix + name in least}
+    def of(record: R) -> R:
+        own = {name: value for name, value, _ in record.items() if name in least}
         changes = {
-            name: Constant(below=min(value.below, least[prefix + name]), above=least[prefix + name])
+            name.removeprefix(record.prefix): Constant(below=min(value.below, least[name]), above=least[name])
             for name, value in own.items()
         }
-        return replace(record, **changes) if changes else record  # type: ignore[type-var]
-
-    def beside(record: R, prefix: str) -> R:
-        return of(record, [name.removeprefix(prefix) for name in WIND if name.startswith(prefix)], prefix)
+        return replace(record, **changes)
 
     wind, residual = problem.wind, problem.residual
     return replace(
         problem,
-        constants=of(problem.constants, TABLE),
-        wind=None if wind is None else replace(wind, constants=beside(wind.constants, "wind_")),
-        residual=None if residual is None else beside(residual, "residual_"),
+        constants=of(problem.constants),
+        wind=None if wind is None else replace(wind, constants=of(wind.constants)),
+        residual=None if residual is None else of(residual),
     )
 
 
