@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rechecked import certified, examine, failing, respecified, sealed, unconfirmed
 
-from tubecert.pipeline.width import measure_in
+from tubecert.pipeline.candidates import measured_in
 from tubecert.spec import canonical, load_text
 
 TEXT = (Path(__file__).parents[1] / "specs/ok/outputs.yaml").read_text("utf-8")
@@ -117,6 +117,6 @@ def test_more_than_was_asked_for_is_noticed():
 
 def test_metrics_may_be_compared_by_outputs():
     spec = load_text(TEXT)
-    assert measure_in(spec, ["tip", "m"]).units == {"tip": 0.3, "m": 1.0}
+    assert measured_in(spec, ["tip", "m"]) == {"tip": 0.3, "m": 1.0}
     wanted = TEXT.replace("metric: {rate: 0.8", "metric: {synthesise: {outputs: [tip, x]}} #")
     assert load_text(wanted).synthesis.outputs == ("tip", "x")

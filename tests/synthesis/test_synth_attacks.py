@@ -20,7 +20,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import scan
 from tubecert.metric.verify import verify_metric
 from tubecert.model import build
-from tubecert.pipeline import Options, synthesis, written
+from tubecert.pipeline import Options, synthesis, synthesised
 from tubecert.spec import Synthesis, load_text
 from tubecert.spec.metric_file import with_metric
 from tubecert.synthesis.diagnose import uncontrollable_mode
@@ -229,14 +229,14 @@ def test_a_metric_too_long_to_be_read_is_not_written(monkeypatch):
 
 def test_what_reads_back_differently_is_proven_as_it_reads(monkeypatch):
     """A text that says less than the metric it stands for is caught by the proof of the text."""
-    honest = written._data
+    honest = synthesised._data
 
     def damaged(metric):
         data = honest(metric)
         data["dual_metric"] = [["1", "0.999999"], ["0.999999", "-1"]]
         return data
 
-    monkeypatch.setattr(written, "_data", damaged)
+    monkeypatch.setattr(synthesised, "_data", damaged)
     found = pipeline.synthesise(load_text(small()), WISHES["condition"], Options())
     assert found.verdict == "undecided"
     assert found.file is None

@@ -120,7 +120,7 @@ def certify(
     from tubecert.library.certification import certification_of
     from tubecert.library.metrics import with_metric
     from tubecert.library.workers import workers_of
-    from tubecert.stages.options import Options, overridden
+    from tubecert.stages.question import Options, overridden
 
     require_once(settings_in(whole))
     whole, file = (whole, None) if metric is None else with_metric(whole, metric)

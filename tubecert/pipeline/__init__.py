@@ -9,9 +9,8 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 | `counting` | how many claims of how many are done |
 | `gaps` | how closely each constant is enclosed, where its effect decides |
 | `reasons` | why a verdict about gains is what it is |
-| `synthesis`, `synthesised` | a metric where none is given: objectives, why there is none |
-| `written` | that metric as its file holds it |
-| `width` | how wide a tube is, to compare metrics by |
+| `synthesis`, `synthesised` | a metric where none is given: objectives, its file |
+| `unfound` | why there is none, and what would help |
 | `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
 """
 
@@ -36,10 +35,8 @@ from tubecert.pipeline.deadline import Deadline
 from tubecert.progress import Progress
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
-from tubecert.stages.options import Options, overridden
-from tubecert.stages.question import Question, Stopped
+from tubecert.stages.question import Options, Question, Stopped, overridden, time_of
 from tubecert.stages.result import Stage
-from tubecert.stages.time import time_of
 
 if TYPE_CHECKING:
     from tubecert.pipeline.synthesised import Synthesised

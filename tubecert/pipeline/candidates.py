@@ -6,6 +6,7 @@ fails. What only explains or describes a certificate is left out; what is certif
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf, isfinite, sqrt
 
@@ -18,9 +19,9 @@ from tubecert.kinds.table import kind_of
 from tubecert.pipeline.certification import defect_share, mending, plan, tube
 from tubecert.pipeline.reasons import reasons
 from tubecert.pipeline.synthesised import Row
-from tubecert.pipeline.width import Measure
 from tubecert.search.gains import LEAST
 from tubecert.search.proposers import PROPOSERS, Explained
+from tubecert.spec import Spec
 from tubecert.stages.bounded import Enclosed, enclose, half_widths, unmet
 from tubecert.stages.judged import deciding
 from tubecert.stages.metric import ProvenMetric, prove_metric
@@ -29,8 +30,11 @@ from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict
 
 
-def judged_row(row: Row, question: Question, outputs: Measure | None = None) -> Row:
-    """The row with what its metric comes to, by the width of the tube in `outputs` where those count."""
+def judged_row(row: Row, question: Question, outputs: Mapping[str, float] | None = None) -> Row:
+    """The row with what its metric comes to, by the width of the tube in `outputs` where those count.
+
+    These are states and outputs, each with the unit that its half-width is compared in.
+    """
     end = _enclosed(question, row.metric)
     if isinstance(end, Stopped):
         return replace(row, verdict=end.reason.verdict, claim=end.reason.claim)
@@ -55,12 +59,23 @@ def judged_row(row: Row, question: Question, outputs: Measure | None = None) -> 
         mend=_mend(end) if verdict is not Verdict.CERTIFIED else None,
         input_gain=gain / sqrt(lower) if isfinite(gain) else None,
         rho=float(problem.rho),
-        width=None if outputs is None else outputs.of(half_widths(end)),
+        width=None if outputs is None else _width(half_widths(end), outputs),
         ultimate_radius=distance.ultimate_radius,
         adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
         bandwidth=None if decisive is None or decisive.bandwidth is None else float(decisive.bandwidth),
         demand=_demand(decisive, problem),
     )
+
+
+def measured_in(spec: Spec, outputs: Sequence[str]) -> Mapping[str, float] | None:
+    """What was named, each in its own unit or that of its half-width; None where nothing was."""
+    asked = dict(spec.tube.half_widths)
+    return {name: float(asked.get(name, 1)) for name in outputs} or None
+
+
+def _width(found: Mapping[str, float], units: Mapping[str, float]) -> float:
+    """The largest of the half-widths that count, each in its unit; inf where nothing is known."""
+    return max(found.get(name, inf) / unit for name, unit in units.items())
 
 
 def _mend(enclosed: Enclosed) -> MendPlan | None:

@@ -11,7 +11,7 @@ from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.load import NO_SEARCH
 from tubecert.spec.metric_file import of_no_metric
-from tubecert.stages.time import time_of
+from tubecert.stages.question import time_of
 from tubecert.trajectory.make import unending
 from tubecert.verdict import Verdict
 

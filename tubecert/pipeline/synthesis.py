@@ -41,24 +41,23 @@ from tubecert.enclosure.constant import Witness, round_down
 from tubecert.errors import SpecError
 from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import build, rank_decision
-from tubecert.pipeline.candidates import judged_row
+from tubecert.pipeline.candidates import judged_row, measured_in
 from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, pace, slow_scale
 from tubecert.pipeline.deadline import Cut, Deadline, OutOfTime, cut_by
-from tubecert.pipeline.synthesised import Row, Synthesised
+from tubecert.pipeline.synthesised import Row, Synthesised, TooLongError, file_of, read_back, shorter
 from tubecert.pipeline.unfound import (
     equilibria,
+    half_widths,
     none_certified,
+    otherwise,
     remedies,
     tried,
 )
-from tubecert.pipeline.width import half_widths, measure_in, otherwise
-from tubecert.pipeline.written import TooLongError, file_of, read_back, shorter
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.memory import Memory
-from tubecert.stages.options import Options
-from tubecert.stages.question import Question
+from tubecert.stages.question import Options, Question
 from tubecert.synthesis.diagnose import uncontrollable_mode
 from tubecert.synthesis.family import FamilyError
 from tubecert.synthesis.ladder import Ladder, Request, routes
@@ -278,7 +277,7 @@ class SynthesisRun:
                 raise TooLongError(metric, error.findings[0].code) from None
             return row
         self._say(f"rate {near(metric.rate, 4)}: certifying")
-        outputs = measure_in(self.spec, self.wanted.outputs)
+        outputs = measured_in(self.spec, self.wanted.outputs)
         return judged_row(row, self.ask(spec, self._judging(), self._watch, self.memory), outputs)
 
     def _judging(self) -> Options:

@@ -1,10 +1,12 @@
-"""What a synthesis comes out with: the metrics it compared, the metric file, and what was tried.
+"""What a synthesis comes out with: the metrics it compared, the metric as its file holds it, and what was tried.
 
-In: proven metrics. Out: records for a certificate, a metric file and reports.
+In: proven metrics. Out: records for a certificate, a metric file and reports; what is read back from the text of a
+metric, which is proven anew where it differs.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field, fields
 from math import inf, log
 
@@ -14,15 +16,22 @@ from tubecert.certificate.result import (
     MetricRow,
     RateLimits,
     SearchData,
+    SolverData,
     SynthesisData,
+    metric_file,
 )
-from tubecert.claims.advice import MendPlan
+from tubecert.certificate.sections import metric_data
+from tubecert.claims.advice import ConstantInputs, LowerDegree, MendPlan
 from tubecert.claims.failures import Attempt
-from tubecert.claims.family import Claim, Reason
+from tubecert.claims.family import Claim, Reason, Relax
 from tubecert.claims.statements import PlanBounded, PlanInSafeSet, StartInTube
+from tubecert.expression import to_text
+from tubecert.metric.verify import MetricProof
 from tubecert.pipeline.deadline import Cut
+from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
+from tubecert.spec.metric_file import FORMAT, with_metric_text
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict
 
@@ -122,3 +131,38 @@ class Synthesised:
             solver=None if self.file is None else self.file.solver,
             reason=self.reason,
         )
+
+
+class TooLongError(Exception):
+    """A metric is too long for a file, and so will others be; `code` is that of the finding."""
+
+    def __init__(self, metric: VerifiedMetric, code: str) -> None:
+        super().__init__(code)
+        self.metric, self.code = metric, code
+
+
+def read_back(spec: Spec, metric: VerifiedMetric) -> Spec:
+    """The specification with the metric that its file will hold; raises `SpecError` if it is too long for one."""
+    content = {"format": FORMAT, **_data(metric)}
+    return with_metric_text(spec, json.dumps(content), "<synthesised>")
+
+
+def _data(metric: VerifiedMetric) -> Json:
+    rows = [[to_text(e) for e in row] for row in metric.dual_metric]
+    return {"rate": exact_json(metric.rate), "dual_metric": rows}
+
+
+def file_of(spec: Spec, proof: MetricProof, metric: VerifiedMetric) -> MetricFile:
+    """The file of a metric that is read back as that of `spec`, and proven."""
+    solver = SolverData(
+        route=metric.proposal.route,
+        degree=metric.family.degree,
+        variables=tuple(metric.family.variables),
+        digits=metric.digits,
+    )
+    return metric_file(dict(zip(spec.states, spec.safe_set, strict=True)), metric_data(spec, proof), solver)
+
+
+def shorter(metric: VerifiedMetric) -> Relax:
+    """What makes a metric shorter: where B moves, its fields are what is long."""
+    return LowerDegree() if metric.family.flat else ConstantInputs()

@@ -1,9 +1,11 @@
-"""Why no metric was found, and what would change that: what the attempts lack, and a degree, rate or box that works."""
+"""Why no metric was found, and what would change that: a degree, a rate, a box, a tube that works."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
+from typing import Final
 
 from tubecert.claims.advice import (
     AskForRateUpTo,
@@ -14,11 +16,15 @@ from tubecert.claims.advice import (
 )
 from tubecert.claims.failures import Attempt, NoneCertified, NothingFound
 from tubecert.claims.family import Relax
+from tubecert.enclosure.constant import round_down
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Spec
 from tubecert.synthesis.family import suggested
 from tubecert.synthesis.ladder import Ladder
 from tubecert.verdict import Verdict
+
+_SHARES: Final = (Fraction(1, 2), Fraction(1, 4))  # of the safe set: widths that are tried
+_MANY, _APART = 4, 4  # states, and their ranges, that make radii doubtful
 
 
 def none_certified(rows: Sequence[Row]) -> NoneCertified | None:
@@ -88,3 +94,31 @@ def equilibria(spec: Spec) -> list[tuple[Fraction, ...]]:
         for p in dict.fromkeys(points)
         if all(low <= q <= high for q, (low, high) in zip(p, spec.safe_set, strict=True))
     ]
+
+
+def half_widths(spec: Spec) -> tuple[Fraction, ...]:
+    """What the states are measured in: the tube's half-widths where all are asked for, else the safe set's."""
+    asked = dict(spec.tube.half_widths)
+    if all(name in asked for name in spec.states):
+        return tuple(asked[name] for name in spec.states)
+    return tuple((high - low) / 2 for low, high in spec.safe_set)
+
+
+def otherwise(spec: Spec) -> Iterator[Spec]:
+    """The specification with other tubes, where its radii measure states that differ in unit or scale.
+
+    The same radii in coordinates of the tube, if it is a ball; then half-widths, as shares of the safe set.
+    """
+    tube, units, sizes = spec.tube, dict(spec.units), half_widths(spec)
+    known = {units[name] for name in spec.states if name in units}
+    alike = len(spec.states) < _MANY and len(known) < 2 and max(sizes) < _APART * min(sizes)
+    if tube.half_widths or alike:
+        return
+    if not tube.auto:
+        yield replace(spec, tube=replace(tube, coordinates="auto"))
+    for share in _SHARES:
+        widths = tuple(round_down(float(share * size), 2) for size in sizes)
+        asked = tuple(zip(spec.states, widths, strict=True))
+        yield replace(
+            spec, tube=replace(tube, epsilon=None, rho_a=None, coordinates="auto", half_widths=asked)
+        )

@@ -5,13 +5,11 @@ Trusted: yes; it calls no planner, no solver and no search.
 
 | module | stage | what it adds |
 |---|---|---|
-| `options` | | what is asked beside the specification |
-| `question` | `Question`, `Stopped` | specification, model, options; a claim that is not proven |
+| `question` | `Question`, `Stopped` | specification, model, options, the range of time; a claim that is not proven |
 | `metric` | `ProvenMetric` | B has full rank, C1-C3 hold on the safe set, declared bounds hold |
 | `tube` | `Planned`, `TubeFound` | the plan; a radius for which the tube lies in the safe set |
 | `bounded` | `Enclosed`, `Bounded` | every constant; that those suffice; half-widths, uniqueness of geodesics |
 | `judged` | `Judged` | a section per kind, the verdict |
-| `time` | | the range of time that matters |
 | `memory` | | what does not depend on a changed key is not computed again |
 | `result` | | any stage -> `result` of a certificate |
 """

@@ -18,8 +18,7 @@ from tubecert.kinds.kind import Section
 from tubecert.kinds.table import KINDS, kind_of
 from tubecert.letters import ALL
 from tubecert.stages.bounded import Bounded
-from tubecert.stages.options import Options
-from tubecert.stages.question import Question
+from tubecert.stages.question import Options, Question
 from tubecert.verdict import Verdict
 
 

@@ -1,27 +1,32 @@
-"""The question of a certification, and how an answer may end early."""
+"""The question of a certification: options, the time that matters; and how an answer may end early."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Final
 
+from tubecert.bounds.compute import time_range
 from tubecert.bounds.start import InitialState, KnownStart, StartBox, StartWithin
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.result import SynthesisData
 from tubecert.certificate.sections import declared_metric, declared_uncertainty
 from tubecert.claims.family import Claim, Reason, Relax
+from tubecert.conditions.theorem import Asked
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.enclosure.domain import Range
 from tubecert.executor import Executor
-from tubecert.model import ControlAffineModel, build
+from tubecert.expression.waves import frequencies
+from tubecert.findings import Finding
+from tubecert.model import TIME, ControlAffineModel, build, moving_parts, time_period
 from tubecert.progress import Progress
 from tubecert.records import Json
 from tubecert.spec import Spec, canonical
 from tubecert.stages.memory import Memory
-from tubecert.stages.options import Options
 from tubecert.trajectory import Plan
 from tubecert.verdict import Verdict
 
@@ -38,6 +43,40 @@ _APART: Final = (
 _MANY: Final = (
     4  # states: with fewer, constants that are as close as asked for cost less than to find which matter
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What the command line asks for beside the specification.
+
+    `by_effect`: whether each constant has a gap of its own, such that closer constants would lower the gains that
+    decide by less than `gap`; None: as the specification says.
+    """
+
+    rho_a: Fraction | None = None
+    epsilon: Fraction | None = None
+    metric: Path | None = None
+    conditions: str | None = None
+    bandwidth: Fraction | None = None
+    adaptation_rate: Fraction | None = None
+    gap: Fraction = Fraction(1, 100)
+    by_effect: bool | None = None
+    budget: int = 2_000_000
+
+    def asked(self, *, curve: bool) -> Asked:
+        """The gains that are asked for; with `curve`, what else is possible beside them."""
+        pair = self.bandwidth, self.adaptation_rate
+        return Asked(gains=None if pair[0] is None or pair[1] is None else (pair[0], pair[1]), curve=curve)
+
+
+def overridden(spec: Spec, options: Options) -> Spec:
+    """The specification with the radii of the command line."""
+    tube = replace(
+        spec.tube,
+        epsilon=spec.tube.epsilon if options.epsilon is None else options.epsilon,
+        rho_a=spec.tube.rho_a if options.rho_a is None else options.rho_a,
+    )
+    return replace(spec, tube=tube)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,3 +190,26 @@ def stopped(
 ) -> Stopped:
     """The end of a certification at a claim that is refuted or undecided."""
     return Stopped(at=at, reason=Reason(claim=claim, verdict=verdict, at=where, relax=relax), partial=partial)
+
+
+def time_of(spec: Spec) -> tuple[list[Finding], Range | None]:
+    """The range of time that matters for h and f, or why there is none.
+
+    What must hold for h to be defined may depend on t where h does not, as in 0*(1/(t + 1)).
+    """
+    try:
+        return [], time_range(spec.trajectory.horizon, time_period(moving_parts(spec)))
+    except ValueError as error:
+        finding = Finding(
+            code="TC204",
+            message=str(error),
+            location=spec.location("uncertainty.h"),
+            help="add trajectory.horizon, in seconds",
+        )
+        return [finding], None
+
+
+def period_of(spec: Spec) -> tuple[Fraction, bool] | None:
+    """The period as (q, whether times pi), in s; None if nothing depends on t, or none is to be seen."""
+    found = frequencies(moving_parts(spec), TIME)
+    return None if found is None else found.period

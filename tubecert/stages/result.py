@@ -40,9 +40,7 @@ from tubecert.spec import Spec, canonical
 from tubecert.stages.bounded import Bounded, Enclosed
 from tubecert.stages.judged import Judged
 from tubecert.stages.metric import ProvenMetric
-from tubecert.stages.options import Options
-from tubecert.stages.question import Question, Stopped
-from tubecert.stages.time import period_of
+from tubecert.stages.question import Options, Question, Stopped, period_of
 from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, radii
 
 Stage = Question | ProvenMetric | Planned | TubeFound | Enclosed | Bounded | Judged
