@@ -23,8 +23,7 @@ from tubecert.expression import (
     symbol,
     to_text,
 )
-from tubecert.expression.elsewhere import elsewhere
-from tubecert.expression.meant import mistyped, near
+from tubecert.expression.meant import elsewhere, mistyped, near
 
 x, y, t = (SYMBOLS[name] for name in ("x", "y", "t"))
 

@@ -8,17 +8,15 @@ yes.
 | `graph` | the hash-consed graph, exact folding |
 | `calculus` | other variables put in, derivatives |
 | `lookup` | functions given by tables |
-| `text` | graph -> text in the grammar of the specification |
+| `text` | graph -> text in the grammar of the specification, with the obligations that folding dropped |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
-| `meant`, `elsewhere` | which known word a typing error, or a word of other formats and languages, stands for |
+| `meant` | which known word a typing error, a word of other formats and languages, or a unit stands for |
 | `balls` | values as balls |
 | `number` | text -> rational number, pi and degrees rounded |
-| `owed` | text with the obligations that folding dropped |
 | `zero` | proves that an expression vanishes identically |
 """
 
 from tubecert.expression.calculus import derivative, derivatives, free_symbols, rebuild, substitute
-from tubecert.expression.elsewhere import elsewhere
 from tubecert.expression.graph import (
     ONE,
     PI,
@@ -38,9 +36,8 @@ from tubecert.expression.graph import (
     topological,
 )
 from tubecert.expression.lookup import UNKNOWN, Lookup
-from tubecert.expression.meant import near, rates_of, suggestion
+from tubecert.expression.meant import elsewhere, near, rates_of, suggestion
 from tubecert.expression.number import Side, parse_constant, parse_number, root_above
-from tubecert.expression.owed import full_text
 from tubecert.expression.parse import Obligation, Parsed, parse
 from tubecert.expression.scan import (
     FUNCTIONS,
@@ -51,7 +48,7 @@ from tubecert.expression.scan import (
     ExpressionError,
     is_name,
 )
-from tubecert.expression.text import longest_text, number_text, to_text
+from tubecert.expression.text import full_text, longest_text, number_text, to_text
 from tubecert.expression.zero import is_zero
 
 __all__ = [

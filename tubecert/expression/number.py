@@ -15,7 +15,7 @@ from typing import Final, Literal
 from tubecert.expression import graph
 from tubecert.expression.balls import BITS, middle, values
 from tubecert.expression.graph import Expression, topological
-from tubecert.expression.measures import HAS_NONE, UNITS, instead_of
+from tubecert.expression.meant import HAS_NONE, UNITS, instead_of
 from tubecert.expression.parse import Parsed, parse
 from tubecert.expression.scan import ExpressionError
 
@@ -61,42 +61,33 @@ def parse_constant(text: str, symbols: Mapping[str, Fraction | Expression] | Non
                 raise ZeroDivisionError
         _ends(found)
     except (ValueError, ZeroDivisionError):
-        raise ExpressionError(
-            f"{word[:60]} is not a rational number",
-            offset=len(text) - len(text.lstrip()),
-            width=max(1, len(word)),
-            kind="value",
-            help="write it as a decimal or a fraction, or with pi or deg; numbers here are exact",
-        ) from None
+        help = "write it as a decimal or a fraction, or with pi or deg; numbers here are exact"
+        raise _refused(text, f"{word[:60]} is not a rational number", help) from None
     return found
 
 
 def _check_foreign(text: str, word: str) -> None:
     """Words that are no numbers, and numbers as they are written elsewhere."""
-    start = len(text) - len(text.lstrip()) if word else 0
-    width = max(1, len(word))
-    if word.lower().lstrip("+-.") in _NOT_FINITE:
-        raise ExpressionError(
-            f"{word} is not a finite number",
-            offset=start,
-            width=width,
-            kind="value",
-            help="write a finite number; for a claim for all time leave trajectory.horizon out",
-        )
-    if word.lower().lstrip("+-.") in _NOT_NUMBERS or not word:
+    bare = word.lower().lstrip("+-.")
+    if bare in _NOT_FINITE:
+        help = "write a finite number; for a claim for all time leave trajectory.horizon out"
+        raise _refused(text, f"{word} is not a finite number", help)
+    if bare in _NOT_NUMBERS or not word:
         what = f"{word} is not a number" if word else "a number is missing"
-        raise ExpressionError(
-            what, offset=start, width=width, kind="value", help="write a number such as 0.1 or 1e-3"
-        )
+        raise _refused(text, what, "write a number such as 0.1 or 1e-3")
     if _FOREIGN_NUMBER.fullmatch(word):
-        advice = (
-            "write a decimal point" if "," in word else "write it as one decimal number, times in seconds"
-        )
+        help = "write a decimal point" if "," in word else "write it as one decimal number, times in seconds"
         if _THOUSANDS.fullmatch(word):
-            advice = f"write {word.replace(',', '')}, or {word.replace(',', '.', 1)} if the comma is a decimal point"
-        raise ExpressionError(
-            f"{word[:40]} is not a number", offset=start, width=width, kind="value", help=advice
-        )
+            point = word.replace(",", ".", 1)
+            help = f"write {word.replace(',', '')}, or {point} if the comma is a decimal point"
+        raise _refused(text, f"{word[:40]} is not a number", help)
+
+
+def _refused(text: str, message: str, help: str) -> ExpressionError:
+    """The error for the whole of a text."""
+    word = text.strip()
+    offset = len(text) - len(text.lstrip()) if word else 0
+    return ExpressionError(message, help=help, offset=offset, width=max(1, len(word)), kind="value")
 
 
 def _in_degrees(text: str, symbols: Mapping[str, Expression]) -> tuple[Parsed, Expression]:

@@ -13,10 +13,8 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from tubecert.expression.elsewhere import elsewhere
 from tubecert.expression.graph import FUNCTIONS as SMOOTH
-from tubecert.expression.meant import mistyped
-from tubecert.expression.measures import HAS_NONE, UNITS, instead_of
+from tubecert.expression.meant import HAS_NONE, UNITS, elsewhere, instead_of, mistyped
 
 MAX_LENGTH: Final = 4_000
 MAX_DEPTH: Final = 50

@@ -31,8 +31,7 @@ from tubecert.spec import codes
 from tubecert.spec.document import Node
 from tubecert.spec.lookup import read_lookup
 from tubecert.spec.reader import Field
-from tubecert.spec.scope import Scope
-from tubecert.spec.values import Ends, Output, Term
+from tubecert.spec.values import Ends, Output, Scope, Term
 
 TIME: Final = "t"
 MAX_STATES: Final = 32

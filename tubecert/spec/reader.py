@@ -28,9 +28,8 @@ from tubecert.findings import MOST, Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.document import Node, place_in
 from tubecert.spec.instead import example_of, glued, of_key, of_value, of_word
-from tubecert.spec.scope import MODERATE, Parameters, Scope, out_of_range
 from tubecert.spec.source import Mark, Source
-from tubecert.spec.values import Ends, Matrix, Term, TermMatrix
+from tubecert.spec.values import MODERATE, Ends, Matrix, Parameters, Scope, Term, TermMatrix, out_of_range
 
 T = TypeVar("T")
 

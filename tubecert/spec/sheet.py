@@ -20,8 +20,8 @@ from tubecert.files import read
 from tubecert.findings import Finding, Location
 from tubecert.spec import codes
 from tubecert.spec.reader import Field, T
-from tubecert.spec.scope import MODERATE, out_of_range
 from tubecert.spec.source import PLAN, Mark, Source, decoded
+from tubecert.spec.values import MODERATE, out_of_range
 
 MAX_COLUMNS: Final = 200
 ENOUGH: Final = 20  # findings of one file

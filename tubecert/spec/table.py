@@ -24,9 +24,8 @@ from tubecert.spec.keys import key, section
 from tubecert.spec.lookup import DIGITS, rounded
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field, whole
-from tubecert.spec.scope import MODERATE, out_of_range
 from tubecert.spec.sheet import ENOUGH, Cell, Sheet, number, opened, rows
-from tubecert.spec.values import Interpolation, Knots, Table
+from tubecert.spec.values import MODERATE, Interpolation, Knots, Table, out_of_range
 
 MAX_ROWS: Final = 10_001
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}", re.ASCII)

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from tubecert.expression import ZERO, Expression, symbol
 from tubecert.expression.balls import BITS, ball, middle, values
 from tubecert.expression.matrix import jacobian
-from tubecert.spec.scope import out_of_range
-from tubecert.spec.values import Ends, TermMatrix, Vector
+from tubecert.spec.values import Ends, TermMatrix, Vector, out_of_range
 
 if TYPE_CHECKING:
     from flint import arb
