@@ -160,6 +160,13 @@ def test_nothing_acts_and_nothing_is_asked(delay):
     assert np.isfinite(found.tables.F).all()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("start", [[1.0, 5e-324], [5e-324, 5e-324]])
+def test_a_start_at_zero_is_no_unit_although_it_is_rounded_outward(start):
+    found = design(plant([[0, 1], [-4, -1]], [[0], [1]], sample_time=0.005, start=start))
+    assert np.isfinite(found.W).all()
+
+
 def refused(machine):
     with pytest.raises(NoDesign) as error:
         design(machine)

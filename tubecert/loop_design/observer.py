@@ -21,6 +21,7 @@ HORIZON = 3.0  # sample times and delays after which a signal's effect is the un
 PARALLEL = 1e-6  # below it, what a component of eta does is what others do
 LEAST = 1e-3  # of its unit is what eta may do in a sample, to the observer, even if it is constant
 RARE = 0.03  # of the start's errors come back in every sample, to the observer
+QUIET = 1e-300  # what is smaller is a 0 that was rounded outward
 CLEAN = 1e-12  # an entry that is smaller relative to its row is none: axes that are decoupled stay so
 
 
@@ -36,6 +37,7 @@ def units_of(plant: Plant) -> Units:
     pushed = np.max([np.abs(flow(plant.A, columns, horizon * i / 8)[1]) for i in range(1, 9)], axis=0)
     signals, moved = np.split(pushed, [-plant.B.shape[1]], axis=1)
     states = np.max([signals.sum(axis=1), plant.noise, plant.start], axis=0)
+    states = np.where(states > QUIET, states, 0.0)
     answers = (moved / np.where(states > 0, states, np.inf)[:, None]).max(axis=0)
     free = 10 / np.where(answers > 0, answers, 10)
     inputs = np.where(np.isfinite(plant.room), plant.room, free)
