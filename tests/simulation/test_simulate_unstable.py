@@ -23,7 +23,7 @@ T = symbol("t")
 PLAN = constant_plan([0, 0], [0], None)
 
 
-def loop(*, horizon=6.0, limit=np.inf):
+def loop(*, horizon=6.0, limit=1e6):
     W = matrix_of([["1", "-1/2"], ["-1/2", "1"]], ())
     plain = plain_model(("x1", "x2"), ("x2", "-x1 - x2"), [["0"], ["1"]])
     return LoopProblem(
@@ -60,7 +60,7 @@ def test_a_state_beyond_the_limit_is_not_followed():
 def test_a_state_that_is_no_number_is_not_followed():
     (failure,) = run(loop(), start=(np.nan, 0.0)).failures
     assert failure.t == 0
-    assert failure.reason == "the state diverges from the plan"
+    assert failure.reason.startswith("the state diverges from the plan")
 
 
 def thinner(where, factor):

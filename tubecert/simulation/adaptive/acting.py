@@ -91,6 +91,7 @@ class Acting:
             None, *(_joined(list(each)) for each in zip(*(own[1:] for own in parts), strict=True))
         )
         self._pushes, self._blows = bool(self._own.push.any()), bool(self._own.wind.any())
+        self._clips = bool(np.isfinite(self._own.radius).any())
         self._unknown = np.repeat([float(len(part.theta) > 0) for part in parts], sizes)
         self._theta = (
             self._own.theta if len(self._own.theta) else np.zeros((len(model.parameters), sum(sizes)))
@@ -112,8 +113,10 @@ class Acting:
             h += np.einsum("wjn,wn->jn", own.amplitude, np.sin(angle))
         if self._pushes:
             h += own.push / np.sqrt(np.einsum("jn,jn->n", push, push) + own.layer**2) * push
-        size = np.sqrt(np.einsum("jn,jn->n", h, h))
-        return np.asarray(h * np.minimum(1.0, own.radius / np.maximum(size, _NOTHING)))
+        if self._clips:
+            size = np.sqrt(np.einsum("jn,jn->n", h, h))
+            h *= np.minimum(1.0, own.radius / np.maximum(size, _NOTHING))
+        return np.asarray(h)
 
     def wind(self, t: float, terms: Terms, pushes: tuple[Array, Array]) -> Array:
         """E w and what unknown parameters do, (n, N); `pushes`: M gamma_s and B B'M gamma_s."""

@@ -12,6 +12,7 @@ factor methods for stiff PDEs, J. Comput. Phys. 203, 2005.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from math import log
 from typing import Final, NamedTuple
 
@@ -23,23 +24,16 @@ from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.acting import Acting
 from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, times
 from tubecert.simulation.adaptive.geodesics import FOUND, REASONS, Geodesic, Geodesics
-from tubecert.simulation.adaptive.loops import Batch, LoopGains, LoopProblem
+from tubecert.simulation.adaptive.loops import Batch
 from tubecert.simulation.adaptive.times import END, MIDDLE, START, Grid, Reference
 from tubecert.simulation.lanes import SHARES
 from tubecert.trajectory import Plan
 
 INFEASIBLE: Final = 10
 DIVERGED: Final = 20
-_FAR: Final = 1e6
+_NOTHING: Final = 1e-300  # so small that nothing is divided by less
 _ROUNDING: Final = 1e-12
 _SIDES: Final = (START, MIDDLE, MIDDLE, END)  # of a step, stage by stage
-
-
-class _Stage(NamedTuple):
-    """Of a stage: h, with E w after it where one blows, (F, N), and B (n, m, N) or (n, m)."""
-
-    forces: Array
-    B: Array
 
 
 class _Group(NamedTuple):
@@ -52,10 +46,9 @@ class _Group(NamedTuple):
 
 def reason(stopped: int, limit: float) -> str:
     """Why a lane was stopped."""
-    beyond = "" if np.isinf(limit) else f": |x - x*| exceeds {near(limit, 4)}"
     own = {
         INFEASIBLE: "no input makes the metric contract here",
-        DIVERGED: f"the state diverges from the plan{beyond}",
+        DIVERGED: f"the state diverges from the plan: |x - x*| exceeds {near(limit, 4)}",
     }
     return {**REASONS, **own}[stopped]
 
@@ -63,7 +56,8 @@ def reason(stopped: int, limit: float) -> str:
 class Continuous:
     """The lanes of some batches on a grid: a `lanes.System`.
 
-    `_y` (Y, N) is the fast part of every lane at the start of the step (`flows.blocks`).
+    `_y` (Y, N) is the fast part of every lane at the start of the step (`flows.blocks`); in `_known` behind it stands h
+    at every stage, with E w after it where one blows, (F, N), and in `_B` B (n, m, N) or (n, m).
     """
 
     kept = ("x", "off", "slope", "u", "k", "u_a", "sigma_hat", "h", "xtilde", "distance")
@@ -71,45 +65,35 @@ class Continuous:
     def __init__(self, batches: Sequence[Batch], grid: Grid, plans: Sequence[Plan]) -> None:
         first = batches[0].problem
         n, m = len(first.model.states), len(first.model.inputs)
-        problems = [batch.problem for batch in batches]
-        sizes = [len(batch.x0) for batch in batches]
-        self.steps, self._grid, self._N = grid.steps, grid, sum(sizes)
+        problems = [batch.problem for batch in batches for _ in batch.x0]
+        self.steps, self._grid, self._N = grid.steps, grid, len(problems)
         self._decay = 2 * float(first.model.rate)
         self._P = np.eye(n) if first.P is None else first.P
         self._x0 = np.concatenate([batch.x0 for batch in batches]).T
         self._acting = Acting([batch.acting for batch in batches], first.model, first.E, first.rest)
         self._geodesics = Geodesics(first.model, first.degree, self._N)
         self._at, self._blown = blocks(n, m), bool(first.E or first.rest)
-        places = [next(i for i, plan in enumerate(plans) if plan is problem.plan) for problem in problems]
-        self._plans = np.repeat(places, sizes) if len(plans) > 1 else None
-        self._limit = np.repeat([problem.limit for problem in problems], sizes)
-        self._predicts = np.repeat([problem.adapts for problem in problems], sizes)
-        self._roots, self._groups = np.ones(self._N), list[_Group]()
-        for problem, size, end in zip(problems, sizes, np.cumsum(sizes).tolist(), strict=True):
-            if problem.filters and problem.gains is not None:
-                self._add(problem, problem.gains, slice(end - size, end))
+        self._forces = m + n * self._blown
+        places = {id(plan): place for place, plan in enumerate(plans)}
+        self._plans = np.array([places[id(own.plan)] for own in problems]) if len(plans) > 1 else None
+        self._far = np.array([own.limit for own in problems]) ** 2
+        self._predicts = np.array([own.adapts for own in problems])
+        self._roots, self._groups, end = np.ones(self._N), list[_Group](), 0
+        for (adapts, gains), group in groupby(
+            problems, key=lambda own: (own.adapts, own.filters and own.gains)
+        ):
+            lanes = slice(end, end := end + len([*group]))
+            if gains:
+                self._groups.append(_Group(lanes, Fast(adapts, gains, self._P, m, self._forces), {}))
+                self._roots[lanes] = self._groups[-1].fast.root
         self.stopped = np.zeros(self._N, dtype=np.int64)
-
-    def _add(self, problem: LoopProblem, gains: LoopGains, lanes: slice) -> None:
-        """Lanes of a loop that adapts: to the group before, if that has the same terms and gains."""
-        n, m = len(problem.model.states), len(problem.model.inputs)
-        if self._groups:
-            last = self._groups[-1]
-            same = (problem.adapts, gains) == (last.fast.adapts, last.fast.gains)
-            if same and last.lanes.stop == lanes.start:
-                self._groups[-1] = last._replace(lanes=slice(last.lanes.start, lanes.stop))
-                self._roots[lanes] = last.fast.root
-                return
-        fast = Fast(problem.adapts, gains, self._P, m, m + n * self._blown)
-        self._groups.append(_Group(lanes, fast, {}))
-        self._roots[lanes] = fast.root
 
     def start(self) -> Array:
         """x (n, N) at the start."""
         self.stopped[:] = FOUND
-        self._y = np.zeros((self._at.end, self._N))
-        self._stages = list[_Stage]()
-        self._own: list[Flow] = []
+        self._known = np.zeros((self._at.end + len(_SIDES) * self._forces, self._N))
+        self._y, self._within = self._known[: self._at.end], np.zeros((2, self._N))
+        self._B, self._own = list[Array](), list[Flow]()
         return self._x0.copy()
 
     def at(self, step: int, stage: int, x: Array) -> Array:
@@ -117,7 +101,7 @@ class Continuous:
         t = float(self.steps.start[step] + SHARES[stage] * self.steps.length[step])
         plan = self._plan(step, _SIDES[stage])
         if stage == 0:
-            self._stages.clear()
+            self._B.clear()
         elif self._groups:
             x = x + self._flown(step, stage, x)
         x = self._near(x, plan.x)
@@ -128,12 +112,19 @@ class Continuous:
         push = _reached(terms.B, geodesic.end)
         k = self._feedback(plan, ahead, push, geodesic)
         h = self._acting.h(t, x, terms.base, push)
-        wind = self._acting.wind(t, terms, (geodesic.end, times(terms.B, push))) if self._blown else None
-        self._stages.append(_Stage(h if wind is None else np.concatenate([h, wind]), terms.B))
-        if stage == 0:
-            self._seen = {"x": x, "k": k, "h": h, "distance": np.sqrt(np.maximum(geodesic.energy, 0.0))}
         slope = ahead + times(terms.B, k + h)
-        return slope if wind is None else slope + wind
+        first = self._at.end + stage * self._forces
+        self._known[first : first + len(h)] = h
+        self._B.append(terms.B)
+        if self._blown:
+            wind = self._acting.wind(t, terms, (geodesic.end, times(terms.B, push)))
+            self._known[first + len(h) : first + self._forces] = wind
+            slope += wind
+        if stage == 0:
+            distance = np.sqrt(np.maximum(geodesic.energy, 0.0))
+            seen = {"x": x, "off": x - plan.x, "k": k, "h": h, "u": plan.u + k, "distance": distance}
+            self._seen = seen
+        return slope
 
     def _plan(self, step: int, side: int) -> Reference:
         """The plans of all lanes, (.., 1) if that is one."""
@@ -143,8 +134,7 @@ class Continuous:
     def _near(self, x: Array, plan: Array) -> Array:
         """x, and the plan for lanes that are stopped because they are nowhere near it, or were before."""
         off = x - plan
-        most = np.minimum(self._limit, _FAR * (1.0 + np.abs(plan).max(axis=0)))
-        self._stop(~(np.einsum("in,in->n", off, off) <= most * most), DIVERGED)  # not for nan
+        self._stop(~(np.einsum("in,in->n", off, off) <= self._far), DIVERGED)  # not for nan
         return np.where(self.stopped, plan, x) if self.stopped.any() else x
 
     def _stop(self, lanes: NDArray[np.bool_], why: NDArray[np.int64] | int) -> None:
@@ -153,12 +143,14 @@ class Continuous:
 
     def _feedback(self, plan: Reference, ahead: Array, push: Array, geodesic: Geodesic) -> Array:
         """k (m, N) of (0.5); `ahead` is f(x) + B(x)u*, `push` is phi_1/2."""
-        lost, gained = (plan.speed * geodesic.start).sum(axis=0), np.einsum("in,in->n", geodesic.end, ahead)
-        phi = self._decay * geodesic.energy - 2 * lost + 2 * gained
-        reach = np.einsum("jn,jn->n", push, push)
-        steep = (phi > 0) & (reach == 0)
-        self._stop(steep & (phi > _ROUNDING * (np.abs(lost) + np.abs(gained))), INFEASIBLE)
-        return np.where(reach > 0, np.minimum(-phi, 0.0) / (2 * reach), 0.0) * push
+        lost, gained = (
+            np.einsum("in,in->n", plan.speed, geodesic.start),
+            np.einsum("in,in->n", geodesic.end, ahead),
+        )
+        phi, reach = self._decay * geodesic.energy + 2 * (gained - lost), np.einsum("jn,jn->n", push, push)
+        if not reach.all():
+            self._stop((reach == 0) & (phi > _ROUNDING * (np.abs(lost) + np.abs(gained))), INFEASIBLE)
+        return np.asarray(np.minimum(-phi, 0.0) / (2 * np.maximum(reach, _NOTHING)) * push)
 
     def _flown(self, step: int, stage: int, x: Array) -> Array:
         """What u_a has added to the slow state until a stage (n, N); it is V times the mean of B so far."""
@@ -166,13 +158,14 @@ class Continuous:
             self._prepare(step, x)
         V = np.zeros((self._at.V.stop - self._at.V.start, self._N))
         for group, flow in zip(self._groups, self._own, strict=True):
-            V[:, group.lanes] = group.fast.idle(flow, self._begun(group, stage), whole=stage == 3)
-        return times(self._stages[stage - 1].B, V)
+            known = self._known[: self._at.end + stage * self._forces, group.lanes]
+            V[:, group.lanes] = group.fast.idle(flow, group.fast.ahead(known), whole=stage == 3)
+        return times(self._B[-1], V)
 
     def _prepare(self, step: int, x: Array) -> None:
         """The flows of a step: those of B at its middle, where x comes but for u_a."""
         length, level = float(self.steps.length[step]), self._grid.level
-        t, B = float(self.steps.start[step]) + length / 2, self._stages[0].B
+        t, B = float(self.steps.start[step]) + length / 2, self._B[0]
         if B.ndim == 3:
             B = self._acting.input(t, x + length / 2 * times(B, self._y[self._at.u_a]))
             self._own = [group.fast.flow(B[..., group.lanes], length, level) for group in self._groups]
@@ -183,26 +176,14 @@ class Continuous:
                 group.flows[same] = group.fast.flow(B, length, level)
         self._own = [group.flows[same] for group in self._groups]
 
-    def _begun(self, group: _Group, stage: int) -> Array:
-        """(y, p, p', p'') at the start of the step, where p is h as known before a stage, or after all four."""
-        a, *later = (own.forces[:, group.lanes] for own in self._stages)
-        slope, bend = np.zeros_like(a), np.zeros_like(a)
-        if stage == 2:
-            slope = 4 * (later[0] - a)  # a line whose mean over half of the step is the stage before
-        elif stage == 3:
-            slope = 2 * (later[1] - a)  # ... over the whole step
-        elif stage == 4:
-            middle, end = later[0] + later[1], later[2]
-            slope, bend = -3 * a + 2 * middle - end, 4 * (a - middle + end)
-        return np.concatenate([self._y[:, group.lanes], a, slope, bend])
-
     def step(self, step: int) -> Array | float:
         """Takes the fast part to the end of a step; what u_a has added to x."""
         if not self._groups:
             return 0.0
         for group, flow in zip(self._groups, self._own, strict=True):
-            self._y[:, group.lanes] = group.fast.advance(flow, self._begun(group, 4))
-        a, b, c, d = (own.B for own in self._stages)
+            z = group.fast.ahead(self._known[:, group.lanes])
+            self._y[:, group.lanes], self._within[:, group.lanes] = group.fast.advance(flow, z)
+        a, b, c, d = self._B
         moved = times(a if a.ndim == 2 else (a + 2 * (b + c) + d) / 6, self._y[self._at.V])
         self._y[self._at.V] = 0.0
         if self.stopped.any():
@@ -210,30 +191,33 @@ class Continuous:
         return moved
 
     def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
-        """What is seen of the lanes at the start of a step; `off` is x - x*."""
+        """What is seen of the lanes at the start of a step; `off` is x - x*, `within` what the step before had seen."""
         at, y = self._at, self._y
-        plan = self._plan(step, START)
         u_a = y[at.u_a].copy()
         return {
             **self._seen,
             "u_a": u_a,
             "sigma_hat": y[at.sigma_hat].copy(),
             "xtilde": y[at.xi] / self._roots,
-            "u": plan.u + self._seen["k"] + u_a,
-            "off": self._seen["x"] - plan.x,
-            "slope": slope + times(self._stages[0].B, u_a),
+            "u": self._seen["u"] + u_a,
+            "slope": slope + times(self._B[0], u_a),
+            "within": self._within.copy(),
         }
 
     def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
-        """What peaks are taken of: d(x*, x), |S (x - x*)|, |u|, |k|, |S xtilde|, |sigma_hat - h|, |S x'|."""
-        length, error = self._length, rows["sigma_hat"] - rows["h"]
+        """What peaks are taken of: d(x*, x), |S (x - x*)|, |u|, |k|, |S xtilde|, |sigma_hat - h|, |S x'|.
+
+        xtilde and sigma_hat may turn often in a step: theirs are the largest since the step before.
+        """
+        length, error = self._length, np.where(self._predicts, _norm(rows["sigma_hat"] - rows["h"]), 0.0)
+        xtilde, within = length(rows["xtilde"]), np.moveaxis(rows["within"], 1, 0)
         return {
             "distance": rows["distance"],
             "deviation": length(rows["off"]),
             "u": _norm(rows["u"]),
             "k": _norm(rows["k"]),
-            "xtilde": length(rows["xtilde"]),
-            "sigma_error": np.where(self._predicts, _norm(error), 0.0),
+            "xtilde": np.maximum(xtilde, within[0]),
+            "sigma_error": np.maximum(error, within[1]),
             "speed": length(rows["slope"]),
         }
 

@@ -22,6 +22,12 @@ _TURN: Final = 1.0  # rad between two looks at the projection on the first level
 _MOST_HALVINGS: Final = 12  # of a step
 _ORDER: Final = 7  # of Taylor's polynomial
 _LAYERED: Final = 0.5  # within a smooth layer of this or less sigma_hat slows down over a part of a turn
+_POLYNOMIALS: Final = (  # p, p', p'' at the start of a step by h at its stages so far
+    ((1,), (0,), (0,)),
+    ((1, 0), (-4, 4), (0, 0)),  # a line whose mean over half of the step is the stage before
+    ((1, 0, 0), (-2, 0, 2), (0, 0, 0)),  # ... over the whole step
+    ((1, 0, 0, 0), (-3, 2, 2, -1), (4, -4, -4, 4)),
+)
 
 
 class Blocks(NamedTuple):
@@ -43,15 +49,11 @@ def blocks(n: int, m: int) -> Blocks:
 class Flow(NamedTuple):
     """Flows of (y, p, p', p'') for B (n, m) or (n, m, N), where p is h, with E w after it where a wind blows.
 
-    The time is in shares of the step for p. (.., Y, Z) over `half` and `whole` of it; (.., Z, Z) over a `part`, of
-    which `parts` make a step; `rows` (.., 2 parts m, Z): sigma_hat after every half of a part.
+    The time is in shares of the step for p. `powers` (.., Z, Z): over half of a part of the step, over a part, over
+    two and so on; the last one is over all of the step.
     """
 
-    half: Array
-    whole: Array
-    part: Array
-    rows: Array
-    parts: int
+    powers: list[Array]
     length: float
     B: Array
 
@@ -62,6 +64,11 @@ class Fast:
     def __init__(self, adapts: bool, gains: LoopGains, P: Array, m: int, forces: int) -> None:
         self.adapts, self.gains, self.P, self.forces = adapts, gains, P, forces
         self.at, self._m = blocks(len(P), m), m
+        self._ahead = [
+            np.eye(self.at.end + 3 * forces, self.at.end + len(own[0]) * forces) for own in _POLYNOMIALS
+        ]
+        for ahead, own in zip(self._ahead, _POLYNOMIALS, strict=True):
+            ahead[self.at.end :, self.at.end :] = np.kron(own, np.eye(forces))
         self.root = np.sqrt(gains.adaptation_rate or 1.0)
         layer = gains.smooth or 0.0
         self.limit = gains.projection_radius / np.sqrt(1 + layer)  # 2.5: within this F <= 0
@@ -72,14 +79,9 @@ class Fast:
         turns = length * self._speed(B) / _TURN * 2**level
         halvings = 2 + int(np.clip(np.ceil(np.log2(max(turns, 1.0))), 0, _MOST_HALVINGS))
         powers = [_exponential(G / 2**halvings)]
-        rows = powers[0][:, self.at.sigma_hat]
         for _ in range(halvings):
-            if self.adapts:
-                rows = np.concatenate([rows, rows @ powers[-1]], axis=1)
             powers.append(powers[-1] @ powers[-1])
-        own = (powers[-2][:, : self.at.end], powers[-1][:, : self.at.end], powers[1], rows)
-        half, whole, part, rows = own if B.ndim == 3 else [flow[0] for flow in own]
-        return Flow(half, whole, part, rows, 2 ** (halvings - 1), length, B)
+        return Flow(powers if B.ndim == 3 else [power[0] for power in powers], length, B)
 
     def _speed(self, B: Array) -> float:
         """How fast y turns, in rad/s: omega, g and sqrt(Gamma) |S B|."""
@@ -112,34 +114,54 @@ class Fast:
         G[shift, shift + F] = 1.0
         return G
 
+    def ahead(self, known: Array) -> Array:
+        """(y, p, p', p'') at the start of a step, from y and h at its stages so far."""
+        stages = (len(known) - self.at.end) // self.forces
+        return np.asarray(self._ahead[stages - 1] @ known)
+
     def idle(self, flow: Flow, z: Array, whole: bool) -> Array:
         """V (m, N) after the whole step or half of it, from z = (y, p, p', p'') (Z, N), were the projection idle."""
-        return _applied((flow.whole if whole else flow.half)[..., self.at.V, :], z)
+        return _applied(flow.powers[-1 if whole else -2][..., self.at.V, :], z)
 
-    def advance(self, flow: Flow, z: Array) -> Array:
-        """y (Y, N) after the whole step, from z = (y, p, p', p'') (Z, N)."""
-        y = _applied(flow.whole, z)
-        if self.adapts:
-            seen = _applied(flow.rows, z).reshape(-1, self._m, z.shape[1])
-            touching = np.flatnonzero((seen**2).sum(axis=1).max(axis=0) > self.limit**2)
-            if len(touching):
-                y[:, touching] = self._caught(flow, z, touching)
-        return y
+    def advance(self, flow: Flow, z: Array) -> tuple[Array, Array]:
+        """y (Y, N) after the whole step, from z = (y, p, p', p'') (Z, N).
+
+        Beside it the largest |S xtilde| and |sigma_hat - h| in the step, (2, N).
+        """
+        at, m = self.at, self._m
+        if not self.adapts:
+            return _applied(flow.powers[-1], z)[: at.end], np.zeros((2, z.shape[1]))
+        parts = 2 ** (len(flow.powers) - 2)
+        course = np.empty((len(z), parts + 1, z.shape[1]))
+        course[:, 0], course[:, -1] = z, _applied(flow.powers[-1], z)
+        for i, power in enumerate(flow.powers[1:-1]):
+            course[:, 2**i : 2 ** (i + 1)] = _applied(power, course[:, : 2**i])
+        between = _applied(flow.powers[0][..., at.sigma_hat, :], course[:, :-1])
+        size = ((own**2).sum(axis=0).max(axis=0) for own in (course[at.sigma_hat], between))
+        touching = np.flatnonzero(np.maximum(*size) > self.limit**2)
+        if len(touching):
+            course[:, 1:, touching] = self._caught(flow, z[:, touching], touching)
+        xi, error = course[at.xi], course[at.sigma_hat] - course[at.end : at.end + m]
+        squares = (xi * _applied(self.P, xi)).sum(axis=0), (error**2).sum(axis=0)
+        most = np.sqrt([np.maximum(square.max(axis=0), 0.0) for square in squares])
+        return course[: at.end, -1], most / [[self.root], [1.0]]
 
     def _caught(self, flow: Flow, z: Array, lanes: NDArray[np.intp]) -> Array:
-        """y of some lanes after all parts of the step, with the projection."""
-        at, dt = self.at, flow.length / flow.parts
-        shared = flow.part.ndim == 2
-        part, B = (flow.part, flow.B) if shared else (flow.part[lanes], flow.B[..., lanes])
+        """z (Z, parts, ..) of some lanes after every part of the step, with the projection."""
+        at, part, B = self.at, flow.powers[1], flow.B
+        if B.ndim == 3:
+            part, B = part[lanes], B[..., lanes]
+        parts = 2 ** (len(flow.powers) - 2)
+        course, dt = np.empty((len(z), parts, z.shape[1])), flow.length / parts
         missing = np.zeros((len(z), self._m, *B.shape[2:]))  # what a cut was missing from, on the way to it
         missing[at.xi] = dt / 2 * self.root * B
         one = np.eye(self._m).reshape(self._m, self._m, *[1] * (B.ndim - 2))
         missing[at.sigma_hat], missing[at.u_a] = one, -dt / 2 * self.gains.bandwidth * one
-        z = z[:, lanes]
-        for _ in range(flow.parts):
+        for i in range(parts):
             before, z = z[at.sigma_hat], _applied(part, z)
             z -= times(missing, self._cut(before, z[at.sigma_hat]))
-        return z[: at.end]
+            course[:, i] = z
+        return course
 
     def _cut(self, before: Array, after: Array) -> Array:
         """What Proj of 2.5 takes out of sigma_hat (m, N) that goes from before to after, along its middle."""
@@ -171,8 +193,12 @@ def times(B: Array, u: Array) -> Array:
 
 
 def _applied(M: Array, z: Array) -> Array:
-    """M z for M (r, Z) or (N, r, Z) and z (Z, N)."""
-    return np.asarray(M @ z if M.ndim == 2 else np.matmul(M, z.T[..., None])[..., 0].T)
+    """M z for M (r, Z) or (N, r, Z) and z (Z, .., N)."""
+    if M.ndim == 2:
+        return np.asarray(M @ z.reshape(len(z), -1)).reshape(len(M), *z.shape[1:])
+    columns = z.reshape(len(z), -1, z.shape[-1])
+    found: Array = np.matmul(M, columns.transpose(2, 0, 1)).transpose(1, 2, 0)
+    return found.reshape(M.shape[1], *z.shape[1:])
 
 
 def _exponential(G: Array) -> Array:

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import ZERO, Expression, free_symbols
-from tubecert.expression.matrix import Matrix
+from tubecert.expression import ZERO, Expression, free_symbols, symbol
 from tubecert.model import ControlAffineModel
 
 FOUND, NOT_POSITIVE, NOT_FOUND, UNRESOLVED = range(4)
@@ -36,6 +35,7 @@ _FLAT: Final = 1e-9  # of the largest curvature: no less is divided by
 _UNEVEN: Final = 0.05  # how far the squared speed may vary along the curve, of the energy
 _ROUNDING: Final = 1e-12
 _LONGER: Final = 1e-9  # by how much a geodesic may be longer than the segment
+_TOGETHER: Final = 32  # lanes whose Hessians are taken at once: each is as dear as many curves
 _WATCHED: Final = 64  # calls between two comparisons with the segment
 
 
@@ -53,14 +53,14 @@ class Geodesic(NamedTuple):
 
 
 class _Curve(NamedTuple):
-    """Of polynomials: energy (N,), gradient by the coefficients (n, K, N), the variation of the squared speed (N,).
+    """Of polynomials: energy (N,), its gradient by the coefficients (n, K, N), the squared speed (Q, N).
 
     `m` (n, Q, N) is M gamma_s at the nodes; `W` (n, n, N) is that of the middle.
     """
 
     energy: Array
     gradient: Array
-    uneven: Array
+    density: Array
     m: Array
     W: Array
 
@@ -69,24 +69,36 @@ class Geodesics:
     """Those of N lanes; `a` (n, K, N) are the coefficients of the last ones, from which the next start."""
 
     def __init__(self, model: ControlAffineModel, degree: int, lanes: int) -> None:
-        used = free_symbols(e for row in model.W for e in row)
-        n, self._calls = len(model.states), 0
-        moving = [i for i, name in enumerate(model.states) if name in used]
+        n, used = len(model.states), free_symbols(e for row in model.W for e in row)
+        self._moving, self._calls = [i for i, name in enumerate(model.states) if name in used], 0
         self.a = np.zeros((n, degree - 1, lanes))
-        self._triangle = np.tril_indices(n)
-        slopes = [(i, place, e) for i in moving for place, e in enumerate(_lower(model.W_x[i])) if e != ZERO]
-        self._tape = Tape([*_lower(model.W), *(e for _, _, e in slopes)], model.states)
-        self._slopes = [(i, [place for j, place, _ in slopes if j == i]) for i in moving]
-        if moving:
-            self._s, self._weight, self._phi, self._slope = _polynomials(degree)
-            self._softness = np.linalg.inv(2 * (self._slope * self._weight) @ self._slope.T)
+        v, m = ([f"{of}#{i}" for i in range(n)] for of in "vm")
+        slopes, bent = dict[str, Expression](), list[Expression]()
+        for i in self._moving:
+            entries = {
+                f"W#{i}{j}{k}": (j, k) for j in range(n) for k in range(j + 1) if model.W_x[i][j][k] != ZERO
+            }
+            slopes |= {name: model.W_x[i][j][k] for name, (j, k) in entries.items()}
+            terms = [
+                symbol(name) * (1 + (j != k)) * symbol(m[j]) * symbol(m[k])
+                for name, (j, k) in entries.items()
+            ]
+            bent.append(sum(terms, start=ZERO))
+        rows = [e for row, ahead in zip(model.W, v, strict=True) for e in (*row, symbol(ahead))]
+        self._tape = Tape([*rows, *slopes.values()], (*model.states, *v))
+        self._bent = Tape(bent, (*slopes, *m))
+        if self._moving:
+            self._weight, self._basis, self._along, self._across = _polynomials(degree)
+            slope = self._basis[len(self._weight) :, 1:]
+            self._softness = np.linalg.inv(self._along @ slope)
         else:
-            self._M = np.linalg.inv(self._full(self._tape.run_floats([np.zeros(())] * n, ())))
+            W = Tape([e for row in model.W for e in row], ()).run_floats([], ())
+            self._M = np.linalg.inv(W.reshape(n, n))
 
     def connect(self, p: Array, q: Array) -> Geodesic:
         """From p (n, 1) or (n, N) to q (n, N)."""
         span = q - p
-        if not self._slopes:
+        if not self._moving:
             m = self._M @ span
             status = np.zeros(q.shape[1], dtype=np.int64)
             return Geodesic(status, np.einsum("in,in->n", span, m), m, m, self.a)
@@ -95,11 +107,10 @@ class Geodesics:
         if self._calls % _WATCHED == 1:
             straight = self._expand(p, span, np.zeros_like(self.a)).energy
             found.status[found.energy > straight * (1 + _LONGER)] = NOT_FOUND
-        left = np.flatnonzero(found.status)
-        if len(left):
-            own = self._newton(_some(p, left), span[:, left], self.a[:, :, left])
-            for whole, part in zip(found, own, strict=True):
-                whole[..., left] = part
+        if found.status.any():
+            left = np.flatnonzero(found.status)
+            for some in np.array_split(left, -(-len(left) // _TOGETHER)):
+                _put(found, some, self._newton(_some(p, some), span[:, some], self.a[:, :, some]))
         self.a = found.a
         return found
 
@@ -114,27 +125,25 @@ class Geodesics:
 
     def _descended(self, p: Array, span: Array, a: Array, newton: bool) -> Geodesic:
         """Steps until the energy falls no more: with the Hessian of a constant metric, or its own and line search."""
-        found, lanes, share = None, np.arange(span.shape[1]), np.ones(1)
+        found, lanes = None, np.arange(span.shape[1])
+        share: Array | float = 1.0
         for _ in range(_MOST if newton else _QUICK):
             curve = self._expand(p, span, a)
             if newton:
                 step = self._newton_step(p, span, a, curve.gradient)
                 share = self._share(p, span, (a, step, curve.energy))
             else:
-                pulled = np.einsum("ijn,jkn->ikn", curve.W, curve.gradient)
-                step = np.einsum("kl,iln->ikn", self._softness, pulled)
-            gain, finite = np.einsum("ikn,ikn->n", curve.gradient, step), np.isfinite(curve.energy)
+                step = self._softness @ np.einsum("ijn,jkn->ikn", curve.W, curve.gradient)
+            gain = np.einsum("ikn,ikn->n", curve.gradient, step)
             a = a - share * step
-            done = (gain <= _LAST * curve.energy) & finite & (share == 1)
+            done = (gain <= _LAST * curve.energy) & (share == 1)
             own = _settled(curve, a)
             if found is None:  # mostly of all lanes
                 found = own
                 found.status[~done] = NOT_FOUND
             else:
-                for whole, part in zip(found, own, strict=True):
-                    whole[..., lanes[done]] = part[..., done]
-            left = ~done & finite & (share > 0)
-            if not left.any():
+                _put(found, lanes[done], own, done)
+            if done.all() or not (left := ~done & (share > 0)).any():
                 break
             lanes, p, span, a = lanes[left], _some(p, left), span[:, left], a[:, :, left]
         assert found is not None
@@ -168,38 +177,32 @@ class Geodesics:
         return np.where(worse, 0.0, share)
 
     def _expand(self, p: Array, span: Array, a: Array) -> _Curve:
-        n, Q, N = len(p), len(self._s), span.shape[1]
-        x = p[:, None] + span[:, None] * self._s[:, None] + np.matmul(self._phi.T, a)
-        v = span[:, None] + np.matmul(self._slope.T, a)
-        values = self._tape.run_floats_silenced(list(x), (Q, N))
-        first, second = self._triangle
-        m = _solved(_factored(values[: len(first)], n), v)
-        density = np.einsum("iqn,iqn->qn", v, m)
-        gradient = 2 * np.matmul(self._slope * self._weight, m)
-        at = len(first)
-        for i, places in self._slopes:
-            pull = np.zeros((Q, N))
-            for place, slope in zip(places, values[at : at + len(places)], strict=True):
-                j, k = first[place], second[place]
-                pull += slope * m[j] * m[k] * (1.0 if j == k else 2.0)
-            gradient[i] -= (self._phi * self._weight) @ pull
-            at += len(places)
-        uneven = density.max(axis=0) - density.min(axis=0)
-        return _Curve(self._weight @ density, gradient, uneven, m, self._full(values[: len(first), Q // 2]))
-
-    def _full(self, lower: Array) -> Array:
-        """The symmetric matrices (n, n, ..) of lower triangles."""
-        n = int(self._triangle[0][-1]) + 1
-        W = np.empty((n, n, *lower.shape[1:]))
-        W[self._triangle] = lower
-        W[self._triangle[::-1]] = lower
-        return W
+        n, Q, N = len(p), len(self._weight), span.shape[1]
+        both = self._basis @ np.concatenate([span[:, None], a], axis=1)
+        x, v = p[:, None] + both[:, :Q], both[:, Q:]
+        values = self._tape.run_floats_silenced([*x, *v], (Q, N))
+        rows, slopes = values[: n * n + n].reshape(n, n + 1, Q, N), values[n * n + n :]
+        middle = rows[:, :n, Q // 2].copy()
+        m, positive = _solved(rows)
+        density = np.where(positive, np.einsum("iqn,iqn->qn", v, m), np.nan)
+        gradient = self._along @ m
+        gradient[self._moving] -= self._across @ self._bent.run_floats_silenced([*slopes, *m], (Q, N))
+        return _Curve(self._weight @ density, gradient, density, m, middle)
 
 
 def _settled(curve: _Curve, a: Array) -> Geodesic:
     """The lanes as if they were done; `a` is one step further, for the next time."""
-    resolved = curve.uneven <= _UNEVEN * curve.energy
+    uneven = curve.density.max(axis=0) - curve.density.min(axis=0)
+    resolved = (uneven <= _UNEVEN * curve.energy) & (curve.energy < np.inf)
     return Geodesic(np.where(resolved, FOUND, UNRESOLVED), curve.energy, curve.m[:, 0], curve.m[:, -1], a)
+
+
+def _put(
+    found: Geodesic, lanes: NDArray[np.intp], own: Geodesic, of: NDArray[np.bool_] | slice = slice(None)
+) -> None:
+    """Replaces some lanes by those `of` others."""
+    for whole, part in zip(found, own, strict=True):
+        whole[..., lanes] = part[..., of]
 
 
 def _some(p: Array, lanes: NDArray[np.intp] | NDArray[np.bool_]) -> Array:
@@ -207,40 +210,24 @@ def _some(p: Array, lanes: NDArray[np.intp] | NDArray[np.bool_]) -> Array:
     return p if p.shape[1] == 1 else p[:, lanes]
 
 
-def _lower(W: Matrix) -> list[Expression]:
-    return [row[j] for i, row in enumerate(W) for j in range(i + 1)]
-
-
-def _factored(W: Array, n: int) -> dict[tuple[int, int], Array]:
-    """The Cholesky factors of lower triangles, entry by entry; nan where W is not positive definite."""
-    L = dict[tuple[int, int], Array]()
-    for i in range(n):
-        for j in range(i + 1):
-            total = W[i * (i + 1) // 2 + j]
-            for k in range(j):
-                total = total - L[i, k] * L[j, k]
-            L[i, j] = np.sqrt(total) if i == j else total / L[j, j]
-    return L
-
-
-def _solved(L: dict[tuple[int, int], Array], v: Array) -> Array:
-    """m with L L'm = v, (n, ..)."""
-    m, n = np.empty_like(v), len(v)
-    for i in range(n):
-        total = v[i]
-        for k in range(i):
-            total = total - L[i, k] * m[k]
-        m[i] = total / L[i, i]
-    for i in reversed(range(n)):
-        total = m[i]
-        for k in range(i + 1, n):
-            total = total - L[k, i] * m[k]
-        m[i] = total / L[i, i]
-    return m
+def _solved(rows: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """m (n, ..) with W m = v, from rows (n, n + 1, ..) of W and v, which are lost; whether W is positive definite."""
+    n, lowest = len(rows), rows[0, 0]
+    for k in range(n):  # by Gauss and Jordan, without a search for pivots: these are positive
+        lowest = np.minimum(lowest, rows[k, k])
+        rows[k, k + 1 :] /= rows[k, k]
+        others = rows[:, k].copy()
+        others[k] = 0.0
+        rows[:, k + 1 :] -= others[:, None] * rows[k, k + 1 :]
+    return rows[:, n], lowest > 0
 
 
 def _polynomials(degree: int) -> tuple[Array, Array, Array, Array]:
-    """Nodes (Q,) on [0, 1], Clenshaw-Curtis weights (Q,), phi_k and their slopes (K, Q) for k = 2 .. degree."""
+    """Clenshaw-Curtis weights (Q,) of nodes on [0, 1], and of s and phi_k, k = 2 .. degree: values and slopes there.
+
+    Values, then slopes (2 Q, K + 1); what takes M gamma_s and what W_x does to its gradient to that of the energy,
+    (K, Q) both.
+    """
     from numpy.polynomial import chebyshev
 
     last = degree + _EXTRA_NODES - 1
@@ -248,6 +235,6 @@ def _polynomials(degree: int) -> tuple[Array, Array, Array, Array]:
     moments = np.array([0.0 if k % 2 else 2.0 / (1 - k * k) for k in range(last + 1)])
     weight = np.linalg.solve(chebyshev.chebvander(z, last).T, moments) / 2
     basis = [chebyshev.Chebyshev.basis(k) for k in range(2, degree + 1)]
-    phi = [T(z) - (z if k % 2 else 1.0) for k, T in enumerate(basis, 2)]
-    slopes = [2 * (T.deriv()(z) - k % 2) for k, T in enumerate(basis, 2)]
-    return (z + 1) / 2, weight, np.array(phi), np.array(slopes)
+    phi = np.array([(z + 1) / 2, *(T(z) - (z if k % 2 else 1.0) for k, T in enumerate(basis, 2))])
+    slopes = np.array([0 * z + 1, *(2 * (T.deriv()(z) - k % 2) for k, T in enumerate(basis, 2))])
+    return weight, np.hstack([phi, slopes]).T.copy(), 2 * slopes[1:] * weight, phi[1:] * weight

@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple
@@ -60,7 +59,7 @@ class LoopProblem:
     times: Array
     gains: LoopGains | None = None
     degree: int = 5
-    limit: float = math.inf
+    limit: float = 1e6
     P: Array | None = None
     E: Matrix = ()
     rest: Matrix = ()
