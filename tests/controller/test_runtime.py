@@ -147,8 +147,12 @@ def test_what_stays_far_away_is_no_glitch_and_steered_against():
         held = own.step(np.array([p, v]))
         assert own.step(np.array([70.0, 0.1])) == held, "the first one"
     most = np.array([p + 64 * far.data.limits["reach"][0], 0.1])
-    for _ in range(3):
+    nearer = loop()
+    for y in (most, most - [0.01, 0]):
+        nearer.step(y)
+    for k in range(3):
         assert far.step(np.array([70.0, 0.1])) == edge.step(most) != held
+        assert k or far.state["delta"] != nearer.state["delta"], "they are told apart up to there"
         assert far.state["status"] & BAD
         assert (far.state["zeta"] == edge.state["zeta"]).all()
     far.step(np.array([np.nan, 0]))

@@ -13,6 +13,7 @@ from tubecert.controller.recursion import linear
 from tubecert.simulation.sampled import campaign
 from tubecert.simulation.sampled.attack import Attack, Lanes, goals, worst_of
 from tubecert.simulation.sampled.campaign import simulate
+from tubecert.simulation.sampled.loop import resolved
 
 
 def followed(aims, size, rate):
@@ -81,7 +82,7 @@ def test_a_lie_is_found_with_seed_run_and_time(how):
     first = found.violations[0]
     run, attack = first.peak.run, Attack(own, seed=4)
     again, of = (
-        campaign.vector(attack, partial(linear, own.tables), range(run, run + 1)),
+        resolved(attack, partial(linear, own.tables), range(run, run + 1)),
         own.names.index(first.of),
     )
     assert own.t[again.node[of, 0]] == first.peak.t

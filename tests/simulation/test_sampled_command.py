@@ -73,15 +73,15 @@ def test_who_interrupts_is_told_so_and_has_what_is_finished_without_figures(file
     """The second that is left was spent on figures: 64 runs were lost. Before them not a word was said."""
     asked = ("simulate", "scalar.yaml", "--certificate", "scalar.json", "--runs", "90")
     assert run(*asked).exit_code == 0
-    real, left = campaign.vector, [True] * chunks
+    real, left = campaign.resolved, [True] * chunks
 
-    def vector(*arguments):
+    def resolved(*arguments):
         if not left:
             raise KeyboardInterrupt
         left.pop()
         return real(*arguments)
 
-    monkeypatch.setattr(campaign, "vector", vector)
+    monkeypatch.setattr(campaign, "resolved", resolved)
     found = run(*asked, *(("-o", "new") if not chunks else ()))
     assert found.exit_code == 130, found.output
     if not chunks:

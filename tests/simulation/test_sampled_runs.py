@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from tubecert.controller.recursion import linear
 from tubecert.simulation.sampled.attack import Attack, Lanes
 from tubecert.simulation.sampled.loop import Run
-from tubecert.simulation.sampled.setting import course_of
+from tubecert.simulation.sampled.setting import courses_of
 
 
 class Scripted(Lanes):
@@ -88,7 +88,7 @@ def test_plans_of_a_family_are_members_of_it():
     """x* in P, u* in Q with its rate, and what it misses of the dynamics within the defect; as long as they count."""
     own = setting("pendulum", duration="4")
     dt = own.lengths
-    course = course_of(own, np.random.default_rng(0).random((3 * 3 + 2, 50)))
+    course = courses_of(own, own.spec.trajectory.bundle, np.random.default_rng(0).random((3 * 3 + 2, 50)))
     assert np.mean(course.ends) > 0.95 * own.samples
     assert (abs(course.held) <= 0.3).all()
     assert abs(np.diff(course.held, axis=0)).max() <= 1 * own.Ts * (1 + 1e-9)

@@ -19,7 +19,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.responses import Dynamics
 from tubecert.sampled_loop.setting import Size
 from tubecert.simulation.plans import waves
-from tubecert.simulation.sampled.setting import Integers, Setting, course_of, drawn
+from tubecert.simulation.sampled.setting import Integers, Setting, course_of, courses_of
 
 Flags = NDArray[np.bool_]
 _LAGS: Final = 5000  # of the loop that an adversary looks back, at most
@@ -68,8 +68,9 @@ class Lanes:
 
     def __init__(self, attack: Attack, numbers: range) -> None:
         self.setting, self._worst, number = attack.setting, attack.worst, np.array(numbers)
-        own, start, (n, k) = self.setting, self.setting.loop.start, self.setting.loop.E.shape
-        counts = (1, 2 * len(own.ranges), n + 1, 3 * n, 3 * k, 3 * len(own.slow.size), drawn(own))
+        own, start, bundle = self.setting, self.setting.loop.start, self.setting.spec.trajectory.bundle
+        (n, m), k, r = own.loop.B.shape, own.loop.E.shape[1], len(own.slow.size)
+        counts = (1, 2 * len(own.ranges), n + 1, 3 * n, 3 * k, 3 * r, 4 * n + 3 * m if bundle else 0)
         (kind,), parameters, (*around, far), *self._draws, plan = _drawn(attack.seed, numbers, counts)
         self.aimed, rows = number < len(attack.aims), np.vstack([attack.aims, [0, 0, 0, 1]])
         chosen, self._sample, self._target, self._sign = rows[np.minimum(number, len(attack.aims))].T
@@ -78,11 +79,11 @@ class Lanes:
         share, corner = np.split(parameters, 2)
         low, high = own.ranges.T[:, :, None]
         self.parameters = low + np.where(corner < 0.5, np.round(share), share) * (high - low)
-        random, known = 2 * np.array(around).T - 1, self._known(self._sample)[-n:]
-        towards = np.where(self.aimed & known.any(axis=0), known, worst_of(random, start.length > 0).T)
+        free, aimed = worst_of(2 * np.array(around).T - 1, start.length > 0).T, self._known(self._sample)[-n:]
+        towards = np.where(self.aimed & aimed.any(axis=0), aimed, free)
         inside = np.where(self.aimed | (far < 0.5), 1.0, far)
         self.off = start.known.mid + inside * towards * (start.length or start.box[:, None])
-        self.course = course_of(own, plan)
+        self.course = courses_of(own, bundle, plan) if bundle else course_of(own)
 
     def __len__(self) -> int:
         return len(self.aimed)
@@ -96,10 +97,10 @@ class Lanes:
         own, slow, (noise, wind, last) = self.setting, self.setting.slow, self._draws
         later = np.arange(len(own.lengths)) / len(own.lengths)
         times = [(noise, 0.0), *((wind, part) for part in later.tolist()), (last, 0.0)]
-        random = [waves(draws, own.samples, k + part) for draws, part in times]
+        drawn = [waves(draws, own.samples, k + part) for draws, part in times]
         lag = self._sample - k if k < 0 else (self._sample - k) % (self._sample + 1)
-        known = np.split(self._known(lag), np.cumsum([len(each) for each in random]))
-        heard, *blown, goal = (np.where(self.aimed, *both) for both in zip(known, random, strict=False))
+        aimed = np.split(self._known(lag), np.cumsum([len(each) for each in drawn]))
+        heard, *blown, goal = (np.where(self.aimed, *both) for both in zip(aimed, drawn, strict=False))
         most = (slow.first if k < 0 else slow.rate * own.Ts)[:, None]
         taken = np.outer(own.spread[: own.loop.inputs].any(axis=0), self.own)
         sent = np.where(taken, 0.0, np.clip(slow.size[:, None] * goal, now - most, now + most))

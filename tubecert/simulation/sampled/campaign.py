@@ -13,7 +13,7 @@ import numpy as np
 from tubecert.controller.recursion import linear
 from tubecert.executor import Serial
 from tubecert.progress import Progress
-from tubecert.simulation.sampled.attack import Attack, Flags, Lanes
+from tubecert.simulation.sampled.attack import Attack, Flags
 from tubecert.simulation.sampled.loop import DIVERGED, Controllers, Seen, joined, resolved
 from tubecert.simulation.sampled.setting import Setting
 from tubecert.simulation.vectors import finished, vectors_of
@@ -42,13 +42,8 @@ def simulate(
     attack = Attack(setting, seed)
     asked, size = len(attack.aims) + runs, LANES if setting.spec.trajectory.bundle is None else _PLANS
     vectors, made = vectors_of(asked, min(_FIRST, size), size), controllers or partial(linear, setting.tables)
-    found = joined(finished(partial(vector, attack, made), vectors, Serial(), report))
+    found = joined(finished(partial(resolved, attack, made), vectors, Serial(), report))
     return Campaign(attack, certificate, asked, "c" if controllers else "floats", found)
-
-
-def vector(attack: Attack, made: Controllers, numbers: range) -> Seen:
-    """What is seen of some lanes."""
-    return resolved(Lanes(attack, numbers), made)
 
 
 class Peak(NamedTuple):

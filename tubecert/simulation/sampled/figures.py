@@ -22,12 +22,9 @@ _BOXES: Final = 400  # cross-sections of the tube that are drawn
 
 def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     """Beside its summary, figures only of what was not interrupted; the same campaign gives the same bytes."""
-    lanes = {
-        "error": campaign.found.error,
-        "aimed": campaign.aimed,
-        "names": np.array(campaign.setting.names),
-    }
-    yield "runs.npz", npz({**campaign.peaks, **lanes, "profile": campaign.found.profile})
+    found, names = campaign.found, np.array(campaign.setting.names)
+    more = {"error": found.error, "profile": found.profile, "aimed": campaign.aimed, "names": names}
+    yield "runs.npz", npz({**campaign.peaks, **more})
     if campaign.runs == campaign.asked:  # to draw takes longer than who is interrupted has
         yield from images(DRAWERS, campaign)
 
@@ -64,7 +61,7 @@ def _plane(campaign: Campaign) -> Figure | None:
     plan, boxes = None, list[Array]()
     if own.spec.trajectory.bundle is None:
         parts, corners = len(own.lengths), np.array([[1.0, 1], [1, -1], [-1, -1], [-1, 1]])
-        plan = course_of(own, np.zeros((0, 1))).x[::parts, [i, j], 0]
+        plan = course_of(own).x[::parts, [i, j], 0]
         shown = np.unique(np.linspace(0, own.samples - 1, _BOXES).astype(int))
         boxes = [plan[k] + corners * own.limits[k * parts, [i, j]] for k in shown]
     figure, axis = plane(own.spec, names, boxes, plan)

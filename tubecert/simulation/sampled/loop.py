@@ -13,7 +13,7 @@ from tubecert.controller.recursion import Step
 from tubecert.enclosure.interval import Array
 from tubecert.simulation.obstacles import in_plane, signed_distance
 from tubecert.simulation.plans import integrated
-from tubecert.simulation.sampled.attack import Lanes
+from tubecert.simulation.sampled.attack import Attack, Lanes
 from tubecert.simulation.sampled.setting import Integers
 
 _PACE: Final = 0.15  # |A| times the length of a step, before steps are halved
@@ -49,12 +49,12 @@ def joined(parts: Sequence[Seen]) -> Seen:
     return found._replace(x=parts[0].x, profile=np.max([part.profile for part in parts], axis=0))
 
 
-def resolved(lanes: Lanes, made: Controllers) -> Seen:
-    """What is seen in steps that are halved until no lane is wrong by much, or it is far outside twice.
+def resolved(attack: Attack, made: Controllers, numbers: range) -> Seen:
+    """What is seen of some runs in steps that are halved until none is wrong by much, or it is far outside twice.
 
     An error is twice the difference to steps twice as long, mostly far above the true one; inf for what diverged.
     """
-    own = lanes.setting
+    own, lanes = attack.setting, Lanes(attack, numbers)
     count = max(1, ceil(abs(own.loop.A).sum(axis=1).max() * own.lengths.max() / _PACE))
     found, bounds = Run(lanes, made, count).seen(), own.limits[own.outputs, : own.loop.states, None]
     for level in range(1, _HALVED + 1):

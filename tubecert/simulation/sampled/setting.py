@@ -114,19 +114,8 @@ class Course(NamedTuple):
     inputs: Callable[[float], Array] | None = None
 
 
-def drawn(setting: Setting) -> int:
-    """How many draws a plan of a family needs; 0 where the plan is known."""
-    n, m = setting.loop.states, setting.loop.inputs
-    return 0 if setting.spec.trajectory.bundle is None else 3 * (n + m) + n
-
-
-def course_of(setting: Setting, draws: Array) -> Course:
-    """The plan of the specification, or those of `draws` (`drawn(setting)`, N) in [0, 1)."""
-    bundle = setting.spec.trajectory.bundle
-    return _planned(setting) if bundle is None else _of_family(setting, bundle, draws)
-
-
-def _planned(setting: Setting) -> Course:
+def course_of(setting: Setting) -> Course:
+    """The plan of a specification that is no family."""
     loop, Ts, K = setting.loop, setting.Ts, setting.samples
     plan, end = loop.plan, None if loop.plan.horizon is None else float(loop.plan.horizon)
 
@@ -146,8 +135,11 @@ def _planned(setting: Setting) -> Course:
     return Course(at(setting.t)[0], held, np.full(1, K + 1), inputs)
 
 
-def _of_family(setting: Setting, bundle: Bundle, draws: Array) -> Course:
-    """Plans whose inputs are square waves, held or with the rate that they may have, steered to stay in P."""
+def courses_of(setting: Setting, bundle: Bundle, draws: Array) -> Course:
+    """Plans of a family from `draws` (4 n + 3 m, N) in [0, 1), steered to stay in P.
+
+    Their inputs are square waves, held or with the rate that they may have.
+    """
     (n, m), K, acts, loop = setting.loop.B.shape, setting.samples, setting.acts, setting.loop
     boxes = (np.array(box, dtype=float) for box in (bundle.x, bundle.u))
     steer = Steering(loop.A, loop.B, setting.Ts, *boxes)
