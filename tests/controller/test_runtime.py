@@ -233,6 +233,7 @@ def test_the_self_test_passes_and_notices_a_wrong_step_or_plan(tmp_path, traject
 
     assert wrong() == 0
     changes = [("controller.c", "sum += G[i][j] * dy[j]", "sum += G[i][j] * dy[0]")]
+    changes.append(("controller.c", "if (s->k >= STEPS)", "if (s->k > STEPS)"))
     if afterwards == "repeat":
         changes.append(("controller_data.h", "sin(t)", "sin(t * 1.0000001)"))
     for name, old, new in changes:

@@ -68,6 +68,9 @@ int main(void) {
     wrong += memcmp(s.zeta, before.zeta, sizeof s.zeta) != 0 || memcmp(s.delta, before.delta, sizeof s.delta) != 0;
     for (int j = 0; j < NU; j++) wrong += !(u[j] >= LOW[j] && u[j] <= HIGH[j]);
   }
-  printf("%s: %d steps, %d wrong\n", CERTIFICATE, TESTS + 3, wrong);
+  const State last = s; /* after the end of a plan the command stays */
+  s.k = STEPS;
+  wrong += controller_step(&s, y, GIVEN u) != STATUS_END || memcmp(u, last.u, sizeof u) != 0;
+  printf("%s: %d steps, %d wrong\n", CERTIFICATE, TESTS + 4, wrong);
   return wrong != 0;
 }
