@@ -160,6 +160,18 @@ def test_what_stays_far_away_is_no_glitch_and_steered_against():
 
 
 @pytest.mark.slow
+def test_the_state_of_the_controller_stays_finite_while_samples_are_far():
+    """64 times what is proven of it, however long that lasts: an unstable controller would be lost."""
+    unstable = handmade.tables(1)
+    unstable.F[:], unstable.G[:] = [[1.5]], [[2, 0]]
+    own = loop(controller=unstable, z=1)
+    for side in (1, -1):
+        for _ in range(50):
+            own.step(np.array([70.0 * side, 0.0]))
+        assert own.state["zeta"] == 64 * side * own.data.limits["memory"]
+
+
+@pytest.mark.slow
 def test_time_goes_on_while_samples_are_bad():
     own = loop(WAVE)
     found = [own.step(np.array([np.nan, 0.0]))[0, 0] for _ in range(55)]

@@ -61,14 +61,16 @@ class Controller:
 def build(folder: Path, command: Sequence[str]) -> None:
     """Runs the C compiler in a folder with exported files; raises TC711, also if there is none on PATH."""
     compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
-    if compiler is None:
-        raise _failed(f"there is no C compiler on PATH ({', '.join(COMPILERS)})")
-    call = [compiler, *FLAGS, *command, "-lm"]
     try:  # a compiler of PATH, and the bytes that are exported
+        if compiler is None:
+            raise OSError(f"there is no C compiler on PATH ({', '.join(COMPILERS)})")
+        call = [compiler, *FLAGS, *command, "-lm"]
         subprocess.run(call, cwd=folder, capture_output=True, text=True, check=True)  # noqa: S603
     except (OSError, subprocess.SubprocessError) as error:
-        said = getattr(error, "stderr", None) or error
-        raise _failed(f"the C compiler fails: {visible(str(said).strip())[:400]}") from error
+        said = str(getattr(error, "stderr", None) or error).strip()
+        message = f"the controller cannot be compiled: {visible(said)[:400]}"
+        help = "install gcc or clang: what is simulated is the controller in C, as it is exported"
+        raise TubecertError([Finding(code="TC711", message=message, help=help)]) from error
 
 
 @lru_cache(maxsize=16)
@@ -78,11 +80,6 @@ def _library(files: tuple[tuple[str, bytes], ...]) -> ctypes.CDLL:
             (Path(name) / each).write_bytes(content)
         build(Path(name), ["-shared", "-fPIC", "controller.c", "-o", "controller.so"])
         return ctypes.CDLL(f"{name}/controller.so")
-
-
-def _failed(message: str) -> TubecertError:
-    help = "install gcc or clang: what is simulated is the controller in C, as it is exported"
-    return TubecertError([Finding(code="TC711", message=message, help=help)])
 
 
 def stepper(certificate: Certificate) -> Callable[[int], Step] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import partial, reduce
 from math import ceil
 from typing import Final, NamedTuple, TypeAlias
 
@@ -45,8 +45,11 @@ class Seen(NamedTuple):
 
 def joined(parts: Sequence[Seen]) -> Seen:
     """One for several; states are those of the first."""
-    found = Seen(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
-    return found._replace(x=parts[0].x, profile=np.max([part.profile for part in parts], axis=0))
+    most, node, stopped, error = (
+        np.concatenate(each, axis=-1) for each in list(zip(*parts, strict=True))[:4]
+    )
+    profile = reduce(np.maximum, (part.profile for part in parts))
+    return Seen(most, node, stopped, error, parts[0].x, profile)
 
 
 def resolved(attack: Attack, made: Controllers, numbers: range) -> Seen:
