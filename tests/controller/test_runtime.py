@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from tubecert.controller.compiled import Controller, build
 from tubecert.controller.data import HOME, data_of
 from tubecert.controller.folder import files_of, write
-from tubecert.errors import TubecertError
 
 BAD, END, CLIPPED = 1, 2, 4
 WAVE = handmade.WAVE % ""
@@ -258,7 +257,7 @@ def test_the_self_test_passes_and_notices_a_wrong_step_or_plan(tmp_path, traject
 @pytest.mark.slow
 @pytest.mark.parametrize("flag", ["-ffast-math", "-ffinite-math-only", "-D_M_FP_FAST"])
 def test_fast_math_is_refused(tmp_path, flag):
-    with pytest.raises(TubecertError, match="removes the test"):
+    with pytest.raises(OSError, match="removes the test"):
         build(shipped(tmp_path / "c"), [flag, "-c", "controller.c"])
 
 
@@ -309,7 +308,7 @@ def test_a_million_samples_of_which_some_are_bad(tmp_path, arithmetic):
     flags = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     try:
         build(folder, [*flags, "controller.c", "attack.c", "-o", "attack"])
-    except TubecertError:
+    except OSError:
         pytest.skip("no sanitizers here")
     done = subprocess.run([folder / "attack"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -324,8 +323,7 @@ def test_the_runtime_is_short_and_files_are_the_same_every_time():
     assert one == other
 
 
-def test_without_a_compiler_the_remedy_is_told(monkeypatch):
+def test_without_a_compiler_it_is_said(monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    with pytest.raises(TubecertError, match="no C compiler on PATH") as caught:
+    with pytest.raises(OSError, match="no C compiler on PATH"):
         loop(controller=handmade.tables(2, 77))
-    assert "install" in caught.value.findings[0].help
