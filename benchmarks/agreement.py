@@ -16,10 +16,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from flint import ctx
 
-from tubecert.recheck.certificate import read_certificate
+from tubecert.recheck.certificate import read_result
 from tubecert.recheck.claims import Case
 from tubecert.recheck.constants import OVER_TUBE, bounded
-from tubecert.recheck.document import read
+from tubecert.recheck.document import opened, read
 
 _LARGEST = Fraction(10)  # of mu in the search for du: more than smax(Theta B) of the shipped systems
 
@@ -36,7 +36,7 @@ def main() -> int:
     failed, step = False, Fraction(given.within)
     for path in given.certificates:
         document = read(path.read_text(encoding="utf-8"), str(path))
-        case = Case(read_certificate(document).result, given.boxes)
+        case = Case(read_result(opened(document)[0]), given.boxes)
         for name in OVER_TUBE:
             rising = name == "lower"
             value = getattr(case.constants[name], "above" if rising else "below")

@@ -12,7 +12,7 @@ import proven
 from tubecert import certificate
 from tubecert.errors import TubecertError
 from tubecert.library.rechecking import belongs
-from tubecert.recheck.certificate import read_certificate
+from tubecert.recheck.certificate import read_result
 from tubecert.recheck.claims import Case
 from tubecert.recheck.document import Node
 from tubecert.recheck.grammar import read
@@ -117,7 +117,7 @@ def belongs_to(document: Document, text: str, folder: Path) -> str:
 
 
 def case_of(document: Document, budget: int = 400) -> Case:
-    return Case(read_certificate(Node(document, "certificate")).result, budget)
+    return Case(read_result(Node(document["result"], "certificate.result")), budget)
 
 
 def terms(expressions: list[str], names: str | list[str]) -> list[Term]:

@@ -123,10 +123,11 @@ def belongs(document: Node, name: str, spec: Specifiable) -> str:
     from tubecert.certificate.file import incomplete
     from tubecert.certificate.result import Result
     from tubecert.library.specification import spec_of
-    from tubecert.recheck.certificate import read_certificate
+    from tubecert.recheck.certificate import read_result
+    from tubecert.recheck.document import opened
     from tubecert.records import FormError
 
-    read_certificate(document)  # its form: what is compared below is there, and what is examined is the same
+    read_result(opened(document)[0])  # its form: what is compared below is there, and is what is examined
     loaded = spec_of(spec)
     try:
         result = Result.from_json(document.mapping()["result"])

@@ -13,8 +13,7 @@ from typing import Any
 
 from tubecert.recheck import wind
 from tubecert.recheck.coordinates import Coordinates
-from tubecert.recheck.document import Enclosure, Members, Node, digest, each
-from tubecert.recheck.examines import not_examined
+from tubecert.recheck.document import Enclosure, Members, Node, each
 from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.inputs import read_limited
 from tubecert.recheck.kinds.kind import VERDICTS, Section
@@ -24,7 +23,6 @@ from tubecert.recheck.plans import read_plan
 from tubecert.recheck.reasons import read_assumption, read_reason
 from tubecert.recheck.result import (
     MEASURED,
-    Certificate,
     Claim,
     MetricSection,
     Overrides,
@@ -37,25 +35,15 @@ from tubecert.recheck.specified.numbers import Range, Rows
 from tubecert.recheck.specified.plant import Plant, Wanted, read_wanted
 from tubecert.recheck.specified.trajectory import read_start
 
-NOT_HASHED = ("notes", "run")
-"""Members of a certificate beside its result: what they say is not examined."""
-
 _PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*|\[\d{1,6}\])*", re.ASCII)
 _PART = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]", re.ASCII)
 
 
-def read_certificate(document: Node) -> Certificate:
-    """The certificate in a document; raises `CertificateError` for whatever is not of its form."""
-    own = document.closed("format", "hash", "result", "notes", "run")
-    for key in NOT_HASHED:
-        own[key].mapping()
-    result = read_result(own["result"])
-    unread = (*NOT_HASHED, *not_examined(own["result"], result.verdict))
-    return Certificate(result, own["hash"].text(), digest(own["result"].value), unread)
-
-
 def read_result(node: Node) -> Result:
-    """`result`; one that says `certified` must have every section."""
+    """`result` of a certificate; one that says `certified` must have every section.
+
+    Raises `CertificateError` for whatever is not of its form.
+    """
     own = node.closed(
         "verdict",
         "spec",

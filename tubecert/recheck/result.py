@@ -156,13 +156,3 @@ class Result:
     constants: dict[str, Enclosure] | None
     sections: dict[str, Section] | None  # of every kind by its key
     decided_by: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Certificate:
-    """A certificate: its result, the hash that it states, and the hash that the result has; what no claim examines."""
-
-    result: Result
-    stated_hash: str
-    hash: str
-    unread: tuple[str, ...]

@@ -8,13 +8,14 @@ from functools import partial
 
 from tubecert.errors import ExitCode
 from tubecert.recheck import refuted
-from tubecert.recheck.certificate import read_certificate
+from tubecert.recheck.certificate import read_result
 from tubecert.recheck.claims import Case, of_certified, of_every
 from tubecert.recheck.cover import Claim, Memory, Outcome, stated, telling, time_is_up, within
-from tubecert.recheck.document import SAMPLED_LOOP, Node, read
-from tubecert.recheck.result import Certificate
+from tubecert.recheck.document import NOT_HASHED, SAMPLED_LOOP, Node, opened, read
+from tubecert.recheck.examines import not_examined
+from tubecert.recheck.result import Result
 from tubecert.recheck.sampled_loop import claims as sampled_loop
-from tubecert.recheck.sampled_loop.record import read_certificate as read_sampled_loop
+from tubecert.recheck.sampled_loop.record import read_result as read_sampled_loop
 
 BUDGET = 200_000
 Report = Callable[[str, int, int, int, float], None]
@@ -103,26 +104,33 @@ def recheck(
 
 def _read(document: Node, budget: int) -> tuple[str, str, tuple[str, ...], Callable[[], Iterator[Claim]]]:
     """What a certificate of either format states, its hash, what is not examined, and its claims."""
+    node, said, own = opened(document)
+    of: Callable[[], Iterator[Claim]]
     if document.mapping()["format"] == SAMPLED_LOOP:
-        own = read_sampled_loop(document)
-        return own.verdict, own.stated_hash, own.unread, lambda: sampled_loop.of(own, budget)
-    certificate = read_certificate(document)
-    unread = (*certificate.unread, *_refuted_beside(certificate))
-    return certificate.result.verdict, certificate.stated_hash, unread, lambda: _claims(certificate, budget)
+        loop = read_sampled_loop(node)
+        verdict, unread, of = loop.verdict, loop.unread, partial(sampled_loop.of, loop, budget)
+    else:
+        result = read_result(node)
+        verdict, of = result.verdict, partial(_claims, result, budget)
+        unread = (*not_examined(node, verdict), *_refuted_beside(result))
+
+    def claims() -> Iterator[Claim]:
+        same = said == own
+        yield Claim("the hash is that of the result", (same,), lambda: stated(same, "something was changed"))
+        yield from of()
+
+    return verdict, said, (*NOT_HASHED, *unread), claims
 
 
-def _refuted_beside(certificate: Certificate) -> Iterator[str]:
+def _refuted_beside(result: Result) -> Iterator[str]:
     """Sections and obstacles that are called refuted beside what is certified: why they are is not examined."""
-    result = certificate.result
     if result.verdict == "certified" and result.sections is not None:
         yield from (f"{key}.verdict" for key, own in result.sections.items() if own.verdict == "refuted")
         if any(own.verdict == "refuted" for own in result.clearance):
             yield "clearance.verdict"
 
 
-def _claims(certificate: Certificate, budget: int) -> Iterator[Claim]:
-    same, result = certificate.stated_hash == certificate.hash, certificate.result
-    yield Claim("the hash is that of the result", (same,), lambda: stated(same, "something was changed"))
+def _claims(result: Result, budget: int) -> Iterator[Claim]:
     case = Case(result, budget)
     yield from of_every(result)
     yield from of_certified(case) if result.verdict == "certified" else refuted.of_others(case)

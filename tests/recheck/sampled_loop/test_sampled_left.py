@@ -10,10 +10,10 @@ from sampled_files import CART, SCALAR, changed, made, why_not
 from small_loops import AT_ONE, RANGE, WAVE, scalar, text_of
 
 from tubecert.recheck.cover import CONFIRMED
-from tubecert.recheck.document import Node, read
+from tubecert.recheck.document import Node
 from tubecert.recheck.plans import Knots, Plan
 from tubecert.recheck.sampled_loop.claims import Case
-from tubecert.recheck.sampled_loop.record import Proven, Recipe, Stage, read_certificate
+from tubecert.recheck.sampled_loop.record import Proven, Recipe, Stage, read_result
 from tubecert.recheck.sampled_loop.remainders import Remainders, Size, course_of
 from tubecert.recheck.sampled_loop.theorem import Loop
 from tubecert.recheck.specification import read_sampled_specification
@@ -161,7 +161,7 @@ def test_h_is_defined_on_all_of_the_safe_set():
 def test_h_is_as_large_as_on_the_widest_stage():
     document = made(SCALAR.replace("limits:", "uncertainty: {h: ['0.1*x']}\nlimits:"), base=SCALAR)
     widths = [float(stage["half_widths"]["x"]) for stage in document["result"]["tube"]]
-    found = read_certificate(read(json.dumps(document), "certificate"))
+    found = read_result(Node(document["result"], "result"))
     (own,) = Case(found.specification, found.proven, 2000).slow
     assert max(widths) > 2 * min(widths)
     assert 0.1 * max(widths) <= float(own.size.abs_upper()) <= 0.101 * max(widths)

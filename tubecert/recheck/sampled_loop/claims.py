@@ -19,7 +19,7 @@ from tubecert.recheck.curve import Segment
 from tubecert.recheck.metric import smooth
 from tubecert.recheck.obstacles import Obstacle, Point
 from tubecert.recheck.plans import serves
-from tubecert.recheck.sampled_loop.record import Certificate, Proven, single
+from tubecert.recheck.sampled_loop.record import Proven, Result, single
 from tubecert.recheck.sampled_loop.remainders import PLAN, Course, Remainders, Size, Slow, course_of
 from tubecert.recheck.sampled_loop.theorem import Inequalities, Loop, Phase, phases_of
 from tubecert.recheck.specification import SampledSpecification
@@ -33,12 +33,10 @@ _SECOND = 1 + Fraction(1, 2**20)  # rounding of what is a rounding already
 ROWS = 53  # bits, in which rows are carried
 
 
-def of(certificate: Certificate, budget: int) -> Iterator[Claim]:
-    """Every claim; of a result that is not certified, only that it is what was written, for this specification."""
-    same = certificate.stated_hash == certificate.hash
-    spec, proven = certificate.specification, certificate.proven
-    yield Claim("the hash is that of the result", None, lambda: stated(same, "something was changed"))
-    repeated = {**certificate.repeated, **(proven.repeated if proven else {})}
+def of(result: Result, budget: int) -> Iterator[Claim]:
+    """Every claim; of a result that is not certified, only that it is for this specification."""
+    spec, proven = result.specification, result.proven
+    repeated = {**result.repeated, **(proven.repeated if proven else {})}
     wrong = ", ".join(path for path, (given, own) in repeated.items() if given != own)
     why = f"not what the specification has: {wrong}"
     yield Claim("the specification and what repeats it", None, lambda: stated(not wrong, why))

@@ -24,9 +24,9 @@ from flint import arb, ctx
 
 from tubecert.recheck.balls import Ball, floor, power
 from tubecert.recheck.cover import Outcome, stated
-from tubecert.recheck.document import Node
+from tubecert.recheck.document import Node, opened
 from tubecert.recheck.program import Program
-from tubecert.recheck.sampled_loop.record import Certificate, Proven, read_certificate, single
+from tubecert.recheck.sampled_loop.record import Proven, Result, read_result, single
 from tubecert.recheck.sampled_loop.remainders import Course, course_of
 from tubecert.recheck.specification import SampledSpecification
 from tubecert.recheck.specified.trajectory import Expressed, Resting
@@ -58,12 +58,13 @@ def exported(document: Node, folder: str) -> list[tuple[str, Outcome]]:
 
 def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, Outcome]]:
     """The claims of files by their names, up to the first that is not so."""
-    certificate = read_certificate(document)
-    why = _changed(files, certificate.hash)
+    node, _, sealed = opened(document)
+    result = read_result(node)
+    why = _changed(files, sealed)
     yield "controller: the runtime is that of tubecert", stated(not why, why)
     if why:
         return
-    spec, proven = certificate.specification, certificate.proven
+    spec, proven = result.specification, result.proven
     texts = document.value["result"]["spec"]["effective"]["trajectory"]
     try:
         if proven is None:
@@ -73,7 +74,7 @@ def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, 
         held = HeldPlan(course_of(spec, proven.plan), texts.get("x", ()), texts.get("u", ()))
         found = _PLAN.search(files[_DATA].decode("ascii"))
         xs, us = map(_rows, found.groups() if found else ())
-        same = files[_DATA] == _marked(_data(certificate, proven, held, xs, us).encode())
+        same = files[_DATA] == _marked(_data(sealed, result, held, xs, us).encode())
         why = held.wrong(xs, us) if same else f"{_DATA} is not what tubecert writes for it"
     except (ValueError, OverflowError, KeyError) as error:
         same, why = False, f"{_DATA} is not as tubecert writes it ({error})"
@@ -105,17 +106,20 @@ def _rows(text: str) -> Rows:
     return [[single(float.fromhex(word)) for word in row.split(", ")] for row in rows]
 
 
-def _data(certificate: Certificate, proven: Proven, held: HeldPlan, xs: Rows, us: Rows) -> str:
-    """The text of the data, with the plan that was found."""
-    machine, plant = certificate.specification.hardware, certificate.specification.plant
+def _data(sealed: str, result: Result, held: HeldPlan, xs: Rows, us: Rows) -> str:
+    """The text of the data of a result and its hash, with the plan that was found; raises `ValueError`."""
+    spec, proven = result.specification, result.proven
+    if proven is None:
+        raise ValueError("nothing is certified")
+    machine, plant = spec.hardware, spec.plant
     matrices = {name: [list(map(float, row)) for row in own.tolist()] for name, own in proven.tables.items()}
     matrices |= {"xs": xs, "us": us}
     places: dict[str, object] = {
         **{name: "{" + ",\n".join(map(_array, rows or [[]])) + "}" for name, rows in matrices.items()},
-        **{name: _array(own) for name, own in _limits(certificate.specification, proven).items()},
+        **{name: _array(own) for name, own in _limits(spec, proven).items()},
         **{"n": len(plant.states), "m": len(plant.inputs), "z": proven.tables["F"].nrows()},
         **{"period": float(machine.sample_time), "delay": float(machine.delay), "lead": float(held.lead)},
-        **{"kind": held.kind, "steps": held.steps, "after": held.after, "hash": certificate.hash},
+        **{"kind": held.kind, "steps": held.steps, "after": held.after, "hash": sealed},
         **{"rows": len(held.written), "formula_x": held.formula[0], "formula_u": held.formula[1]},
         "real": "float" if machine.arithmetic == "single" else "double",
     }

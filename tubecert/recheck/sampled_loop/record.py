@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from flint import arb_mat
 
 from tubecert.recheck.certificate import read_settings
-from tubecert.recheck.document import Members, Node, digest, nullable
+from tubecert.recheck.document import Members, Node, nullable
 from tubecert.recheck.plans import Plan, read_knots
 from tubecert.recheck.specification import SampledSpecification, read_sampled_specification
 from tubecert.recheck.specified.numbers import Numbers, Range
 from tubecert.recheck.specified.trajectory import Planned, Tabled
 
-_NOT_EXAMINED = ("notes", "run", "spec.file_hash")
 _PARTS = ("planned", "nominal", "controller", "tube", "recipe", "inputs", "clearance", "lacks")
 _BETWEEN = {"lags": (1, 50_000), "pieces": (1, 64), "panels": (1, 64), "windows": (1, 4_096)}
 _MOST_START = 1_000_000  # samples before the last stage
@@ -73,27 +72,19 @@ class Proven:
 
 
 @dataclass(frozen=True, slots=True)
-class Certificate:
-    """What is claimed, and `proven` where it is certified; the hash that is stated, and the one that it has.
-
-    `unread`: members that no claim examines.
-    """
+class Result:
+    """What is claimed, and `proven` where it is certified; `unread`: members that no claim examines."""
 
     verdict: str
     specification: SampledSpecification
     proven: Proven | None
     repeated: Repeated
-    stated_hash: str
-    hash: str
     unread: tuple[str, ...]
 
 
-def read_certificate(document: Node) -> Certificate:
-    """The certificate in a document; raises `CertificateError` for whatever is not of its form."""
-    whole = document.closed("format", "hash", "result", "notes", "run")
-    for key in ("notes", "run"):
-        whole[key].mapping()
-    own = whole["result"].closed("verdict", "spec", "claim", optional=_PARTS)
+def read_result(node: Node) -> Result:
+    """`result` of a certificate; raises `CertificateError` for whatever is not of its form."""
+    own = node.closed("verdict", "spec", "claim", optional=_PARTS)
     certified = own["verdict"].word("certified", "refuted", "undecided") == "certified"
     if certified and "lacks" in own:
         raise own["lacks"].refused("is there, and yet the verdict is certified")
@@ -110,14 +101,12 @@ def read_certificate(document: Node) -> Certificate:
         "claim.afterwards": (claim["afterwards"].text(), spec.afterwards),
         "claim.hold": (claim["hold"].text(), spec.hardware.hold),
     }
-    return Certificate(
+    return Result(
         verdict=own["verdict"].text(),
         specification=spec,
         proven=_proven(own, spec) if certified else None,
         repeated=repeated,
-        stated_hash=whole["hash"].text(),
-        hash=digest(whole["result"].value),
-        unread=(*_NOT_EXAMINED, *(key for key in _PARTS if key in own and not certified)),
+        unread=("spec.file_hash", *(key for key in _PARTS if key in own and not certified)),
     )
 
 
