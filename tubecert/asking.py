@@ -8,6 +8,7 @@ the command line (`cli.adapter` makes options of them), and what is read. Truste
 from __future__ import annotations
 
 import functools
+import importlib.util
 import inspect
 import numbers
 import os
@@ -25,6 +26,7 @@ from tubecert.findings import Finding, NamedPlace
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 Number: TypeAlias = str | SupportsFloat
 """A text, an int, a Fraction, a Decimal, a number of numpy or sympy: exact; a float is its shortest decimal."""
 METRIC: Final = "a certificate with a metric"
@@ -36,11 +38,12 @@ _SHOWN: Final = 40
 
 @dataclass(frozen=True)
 class Kind:
-    """What an argument is: its `help` and how its value is written (`metavar`), for the command line.
+    """What an argument is, here anything: its `help` and how its value is written (`metavar`), for the command line.
 
     `sets`: the key of the specification that it says. `of`: what it is about, if it means nothing where a specification
-    has `hardware`. `short`: its option of one letter. `many`: it may be given several times. `place`: it is no option,
-    but known by its place, and may be `optional` there.
+    has `hardware`. `called`: its option, if that is not its name, and `short`: of one letter. `many`: it may be given
+    several times. `place`: it is no option, but known by its place, and may be `optional` there. `ending`: of a name
+    that a command makes of what it is about, if none is given.
     """
 
     help: str
@@ -48,15 +51,17 @@ class Kind:
     _: KW_ONLY
     sets: str = ""
     of: str = ""
+    called: str = ""
     short: str = ""
     many: bool = False
     place: bool = False
     optional: bool = False
+    ending: str = ""
     default: Any = None
 
     def read(self, name: str, value: Any) -> Any:
         """The value as it is used, of an argument that is called `name`; raises `SpecError`."""
-        raise NotImplementedError
+        return value
 
 
 @dataclass(frozen=True)
@@ -114,6 +119,18 @@ class Exact(Kind):
 
 
 @dataclass(frozen=True)
+class Seconds(Exact):
+    """How long a command may take, of which a function is told what is left.
+
+    `ends`: the command is ended then, whatever it does; `untold`: the function does not know.
+    """
+
+    _: KW_ONLY
+    ends: bool = False
+    untold: bool = False
+
+
+@dataclass(frozen=True)
 class Choice(Kind):
     """One of the `words`; a command shows them."""
 
@@ -143,12 +160,16 @@ class Text(Kind):
 
 
 @dataclass(frozen=True)
-class Source(Text):
-    """The name of a file, or in code a value that stands for one."""
+class Settings(Kind):
+    """Keys of the specification that are set, as texts, as settings, or as a mapping."""
 
     def read(self, name: str, value: Any) -> Any:
-        """As it is."""
-        return value
+        """The settings, exact; raises `SpecError` with everything that is wrong with them."""
+        from tubecert.spec import Setting
+
+        if isinstance(value, Mapping):
+            return value
+        return each_of(value, lambda own: Setting.of(own) if isinstance(own, str) else own)
 
 
 @dataclass(frozen=True)
@@ -186,22 +207,40 @@ class Flag(Kind):
 
 
 Words: TypeAlias = Mapping[str, Kind]
+SPEC: Final = Kind("The specification (YAML).", "SPEC", place=True)
+CERTIFICATE: Final = Kind("A certificate (JSON).", "CERT", place=True)
+SETTINGS: Final = Settings(
+    "Set a key of the specification, e.g. tube.epsilon=0.3; may be repeated.",
+    "KEY=VALUE",
+    called="--set",
+    many=True,
+)
+ENDING: Final = Seconds(
+    "Seconds after which the command ends, with what it found until then.", ends=True, untold=True
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Asker:
-    """Who asks: whether by options of a command, which one (as it is noted in certificates), and what hears of it.
+    """Who asks: whether by options of a command, and which one (as it is noted in certificates).
 
-    `heard` is told what is found on the way, `judged` the verdict of a synthesis before advice is looked for. `words`
-    and `given` are the kinds of what is asked, and the values.
+    `words` and `given` are the kinds of what is asked, and the values.
     """
 
     options: bool = False
     command: str = ""
-    heard: Callable[[Any], None] | None = None
-    judged: Callable[[Any], None] | None = None
     words: Words = field(default_factory=dict)
     given: Mapping[str, object] = field(default_factory=dict)
+
+
+def hears(progress: object, of: str) -> Callable[[Any], None] | None:
+    """What a callback of progress hears of beside steps, if it does.
+
+    `found`: a line about what is found on the way; `kept`: all that a search has so far; `judged`: its verdict, before
+    advice is looked for.
+    """
+    heard: Callable[[Any], None] | None = getattr(progress, of, None)
+    return heard
 
 
 _CODE: Final = Asker()
@@ -225,7 +264,7 @@ def asked_by(**who: Any) -> Iterator[None]:
 
 def flag(name: str) -> str:
     """The option of an argument."""
-    return f"--{name.strip('_').replace('_', '-')}"
+    return f"--{name.rstrip('_').replace('_', '-')}"
 
 
 def named(name: str) -> str:
@@ -241,8 +280,7 @@ def question(words: Words, *pairs: tuple[str, str]) -> Callable[[Callable[P, R]]
 
     def asks(function: Callable[P, R]) -> Callable[P, R]:
         signature = inspect.signature(function)
-        given = {name: signature.parameters[name].default for name in words}
-        kinds = {name: replace(kind, default=given[name]) for name, kind in words.items()}
+        kinds = with_defaults(words, signature)
 
         @functools.wraps(function)
         def ask(*values: P.args, **options: P.kwargs) -> R:
@@ -256,6 +294,12 @@ def question(words: Words, *pairs: tuple[str, str]) -> Callable[[Callable[P, R]]
         return ask
 
     return asks
+
+
+def with_defaults(words: Words, signature: inspect.Signature) -> dict[str, Kind]:
+    """The kinds with the defaults of a signature; what it does not name keeps its own."""
+    given = {name: own.default for name, own in signature.parameters.items() if own.default is not own.empty}
+    return {name: replace(kind, default=given.get(name, kind.default)) for name, kind in words.items()}
 
 
 def words_of(function: Callable[..., Any]) -> dict[str, Kind]:
@@ -288,6 +332,19 @@ def read(
     return found
 
 
+def each_of(items: Iterable[T], read_one: Callable[[T], R]) -> list[R]:
+    """What is read of every item; raises `SpecError` with everything that is wrong with them."""
+    found, findings = list[R](), list[Finding]()
+    for item in items:
+        try:
+            found.append(read_one(item))
+        except SpecError as error:
+            findings += error.findings
+    if findings:
+        raise SpecError(findings)
+    return found
+
+
 def exact(value: object) -> Fraction | None:
     """A number that was read by its kind."""
     assert value is None or isinstance(value, Fraction)
@@ -308,6 +365,13 @@ def require_nothing_of_a_metric() -> None:
     ]
     if findings:
         raise SpecError(findings)
+
+
+def require_installed(library: str, extra: str, what: str) -> None:
+    """Raises `SpecError` without a library that only an extra of tubecert brings, and that something needs."""
+    if importlib.util.find_spec(library) is None:
+        help = f"install tubecert with its extra: pip install 'tubecert[{extra}]'"
+        raise SpecError([Finding(code="TC122", message=f"{what} {library}", help=help)])
 
 
 def refuse(name: str, text: str, message: str, help: str = "") -> NoReturn:

@@ -62,6 +62,11 @@ def test_certify_writes_and_shows():
         "              tubecert simulate cart.yaml --certificate cart.certificate.json",
         "              tubecert export cart.certificate.json -o cart.controller",
     ]
+    Path("wagon.yaml").write_text(
+        sampled.SPEC
+    )  # named by their files, as the certificate is, not by their system
+    next_one = "tubecert export wagon.certificate.json -o wagon.controller\n"
+    assert run("certify", "wagon.yaml").stdout.endswith(next_one)
     assert json.loads(Path("cart.certificate.json").read_text())["format"] == "tubecert-sampled-loop/1"
     assert "<h1>cart" in Path("cart.html").read_text()
     assert len(run("certify", "cart.yaml", "-q").stdout.splitlines()) == 1

@@ -10,7 +10,7 @@ from commands import run
 from systems import SMALL
 
 import tubecert as tc
-from tubecert.asking import Choice, Exact, Names, asked_by, exact, question, read, words_of
+from tubecert.asking import Choice, Exact, Names, asked_by, exact, flag, question, read, words_of
 from tubecert.cli.adapter import said
 
 WORDS = {"gap": Exact("A gap.", below=1, word="auto"), "runs": Exact("Runs.", whole=True, least=0, most=8)}
@@ -59,9 +59,9 @@ def test_a_command_has_every_word_of_its_function(name):
     function = getattr(tc, name)
     told = " ".join(run(name, "--help").stdout.split())
     for word, kind in words_of(function).items():
-        flag = f"--{word.replace('_', '-')} "
-        assert flag in told or (name, word) == ("verify", "metric")
-        assert word in inspect.signature(function).parameters
+        shown = f"{kind.metavar} " if kind.place else f"{kind.called or flag(word)} "
+        assert shown in told or (name, word) == ("verify", "metric")
+        assert word in inspect.signature(function).parameters or kind.untold
         assert "Exact" not in str(inspect.signature(function))
         assert (name, word) == ("verify", "metric") or " ".join(kind.help.split()) in told
 

@@ -16,7 +16,6 @@ from tubecert.claims.family import Reason
 from tubecert.claims.statements import MetricDefinite
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.letters import ADAPTIVE, name_of, words_of
-from tubecert.library.certification import read as read_file
 from tubecert.model import build
 from tubecert.recheck.run import recheck
 from tubecert.simulation.adaptive.reading import adopted, certified_plan, require_tube
@@ -187,7 +186,7 @@ def test_what_recheck_refuses_simulate_refuses_with_the_same_code(tmp_path, chan
     broken = certified("flat")[1].to_json()
     change(broken)
     path = written(tmp_path, broken)
-    error, finding = refused(read_file, path)
+    error, finding = refused(tubecert.read, path)
     assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC603")
     error, finding = refused(recheck, (tmp_path / "c.json").read_text(), path, 10)
     assert (error.exit_code, finding.code) == (ExitCode.INVALID, "TC603")
@@ -214,7 +213,7 @@ def test_half_widths_keep_their_states_through_a_file(tmp_path):
         )
     )
     result = pipeline.certify(spec, pipeline.Options())
-    read = read_file(written(tmp_path, result)).result
+    read = tubecert.read(written(tmp_path, result)).result
     assert list(read.tube.half_widths) == ["p", "v"]
     for found in (result, read):
         widths = setting_of(spec, found).box

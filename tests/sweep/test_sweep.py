@@ -275,7 +275,7 @@ def test_a_cluster_that_could_find_other_results_is_refused(tmp_path, monkeypatc
             raise others
         return [function() | each for each in others]
 
-    monkeypatch.setattr("tubecert.library.workers.importlib.util.find_spec", lambda name: there)
+    monkeypatch.setattr("tubecert.asking.importlib.util.find_spec", lambda name: there)
     monkeypatch.setattr(Cluster, "versions", asked)
     spec = tmp_path / "one.yaml"
     spec.write_text(ONE, encoding="utf-8")

@@ -1,7 +1,9 @@
 """Questions as commands: the signature of a function and its dictionary of words become options of typer.
 
-A command is a function `f(how, **asked)` below `@command(words, ...)`: what is asked of the library has its words there
-(`asking.words_of`), what the command writes has its own beside. Its numbers are exact, and all that is wrong is told.
+A command is the function of the library that has its name: what it gives is shown, by its page. One that does more is a
+function `f(how, **asked)` below `@command(words, ...)` in a module of its own: what is asked of the library has its
+words there (`asking.words_of`), what the command writes has its own beside. Numbers are exact, and all that is wrong is
+told.
 """
 
 from __future__ import annotations
@@ -11,52 +13,38 @@ import shlex
 import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from importlib import import_module
 from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated, Any, Final, NamedTuple, TypeAlias
 
 import typer
 
-from tubecert.asking import Choice, Exact, Flag, Kind, Text, Words, asked_by, exact, flag, read
+from tubecert.asking import (
+    Choice,
+    Flag,
+    Kind,
+    Seconds,
+    Words,
+    asked_by,
+    exact,
+    flag,
+    read,
+    with_defaults,
+    words_of,
+)
 from tubecert.cli import keeper
 from tubecert.cli.guard import guarded
-from tubecert.errors import ExitCode, SpecError
+from tubecert.errors import ExitCode
 from tubecert.printable import visible
 
 Run: TypeAlias = Callable[..., ExitCode | None]
 
 
-class Settings(Text):
-    """Keys of the specification that are set."""
-
-    def read(self, name: str, value: Any) -> Any:
-        """The settings, exact; raises `SpecError` with everything that is wrong with them."""
-        from tubecert.findings import Finding
-        from tubecert.spec import Setting
-
-        found, findings = list[Setting](), list[Finding]()
-        for each in value:
-            try:
-                found.append(Setting.of(each))
-            except SpecError as error:
-                findings += error.findings
-        if findings:
-            raise SpecError(findings)
-        return found
-
-
-class Ending(Exact):
-    """The seconds of a command that does not look at the time itself."""
-
-
-SPEC: Final = Text("The specification (YAML).", "SPEC", place=True)
-CERTIFICATE: Final = Text("A certificate (JSON).", "CERT", place=True)
-SET: Final = Settings(
-    "Set a key of the specification, e.g. tube.epsilon=0.3; may be repeated.", "KEY=VALUE", many=True
-)
-ENDING: Final = Ending("Seconds after which the command ends, with what it found until then.")
 OUTPUT: Final[Words] = {
     "verbose": Flag("Also show the constants and all assumptions.", short="-v"),
     "quiet": Flag("Only the verdict.", short="-q"),
@@ -125,25 +113,28 @@ class Command:
 
     run: Run
     words: Words
-    pairs: tuple[tuple[str, str], ...]
-    shared: Words
+    pairs: Sequence[tuple[str, str]] = ()
+    shared: Sequence[str] = tuple(OUTPUT)
 
-    def add(self, app: typer.Typer) -> None:
-        """Makes it a command of the app, by its name."""
-        name = self.run.__name__
-        own = said().commands[name]
-        made = with_options(self._ask, {**self.words, **self.shared}, version="quiet" in self.shared)
+    def add(self, app: typer.Typer, name: str) -> None:
+        """Makes it a command of the app."""
+        own, shared = said().commands[name], {each: OUTPUT[each] for each in self.shared}
+        made = with_options(self._ask, {**self.words, **shared}, version="quiet" in shared)
         made.__doc__ = self.run.__doc__
         app.command(name, epilog=own["after"], short_help=own["short"])(made)
 
     def _ask(self, context: typer.Context, **texts: Any) -> None:
         how = Output.of(context, Output(**{name: texts.pop(name) for name in self.shared}))
-        words = shlex.join(["tubecert", *sys.argv[1:]])
-        with guarded(how), asked_by(options=True, command=visible(words)):
+        line = shlex.join(["tubecert", *sys.argv[1:]])
+        with guarded(how), asked_by(options=True, command=visible(line)):
             asked = read(self.words, texts, self.pairs)
-            ending = next((name for name, kind in self.words.items() if isinstance(kind, Ending)), "")
-            if seconds := exact(asked.pop(ending, None)):
-                keeper.left_of(float(seconds), interrupted=True)
+            for name, kind in self.words.items():
+                if isinstance(kind, Seconds) and (seconds := exact(asked.pop(name, None))):
+                    left = keeper.left_of(float(seconds), interrupted=kind.ends)
+                    asked |= {} if kind.untold else {name: left}
+                if kind.ending:
+                    about = next(str(own) for key, own in asked.items() if self.words[key].place)
+                    asked.setdefault(name, f"{Path(about).stem}{kind.ending}")
             with asked_by(words=self.words, given=asked):
                 code = self.run(how, **asked)
         raise typer.Exit(code or ExitCode.CERTIFIED)
@@ -155,17 +146,26 @@ def command(
     """A function `run(how, **asked)` as a command; what its signature does not name has a default in its word."""
 
     def made(run: Run) -> Command:
-        own = inspect.signature(run).parameters
-        kinds = {
-            name: replace(kind, default=own[name].default)
-            if name in own and own[name].default is not inspect.Parameter.empty
-            else kind
-            for name, kind in words.items()
-        }
-        options = {name: OUTPUT[name] for name in shared}
-        return Command(run=run, words=kinds, pairs=pairs, shared=options)
+        kinds = with_defaults(words, inspect.signature(run))
+        return Command(run=run, words=kinds, pairs=pairs, shared=shared)
 
     return made
+
+
+def command_of(name: str) -> Command:
+    """The command of a name: of its module, else what the library gives, shown."""
+    if find_spec(f"tubecert.cli.{name}") is not None:
+        found: Command = getattr(import_module(f"tubecert.cli.{name}"), name)
+        return found
+    function = getattr(import_module("tubecert"), name)
+
+    def run(how: Output, **asked: Any) -> ExitCode:
+        from tubecert.cli.telling import answered
+
+        return answered(how, function, asked)
+
+    run.__doc__ = str(inspect.getdoc(function)).partition("\n\n")[0]
+    return Command(run=run, words=words_of(function), pairs=function.pairs)
 
 
 def with_options(run: Callable[..., None], words: Words, *, version: bool) -> Callable[..., None]:
@@ -188,7 +188,7 @@ def with_options(run: Callable[..., None], words: Words, *, version: bool) -> Ca
 def _parameter(name: str, kind: Kind) -> inspect.Parameter:
     default, value = _typed(name, kind)
     metavar = f"<{'|'.join(kind.words)}>" if isinstance(kind, Choice) and not kind.place else kind.metavar
-    names = filter(None, (flag(name), kind.short))
+    names = filter(None, (kind.called or flag(name), kind.short))
     option: Any = (
         typer.Argument(metavar=metavar, help=kind.help, show_default=False)
         if kind.place

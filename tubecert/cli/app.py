@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import sys
 import warnings
-from importlib import import_module
 from typing import Any
 
 import typer
 
-from tubecert.cli.adapter import OUTPUT, Output, said, with_options
+from tubecert.cli.adapter import OUTPUT, Output, command_of, said, with_options
 from tubecert.cli.guard import flush_stdout, refuse_usage, stdout_failed
 from tubecert.errors import ExitCode
 
@@ -34,7 +33,7 @@ def _main(context: typer.Context, **given: Any) -> None:
 
 app.callback(invoke_without_command=True)(with_options(_main, OUTPUT, version=True))
 for _name in said().commands:
-    getattr(import_module(f"tubecert.cli.{_name}"), _name).add(app)
+    command_of(_name).add(app, _name)
 
 
 def start() -> int:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterable, Iterator, Sequence
-from fractions import Fraction
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tubecert.asking import Text, asked_by, words_of
+from tubecert.asking import SETTINGS, SPEC, Text, words_of
 from tubecert.cli import keeper
-from tubecert.cli.adapter import SET, SPEC, Output, command
+from tubecert.cli.adapter import Output, command
+from tubecert.cli.export import folder_of
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.library import certifying
 
@@ -21,12 +21,17 @@ if TYPE_CHECKING:
     from tubecert.pipeline.synthesised import Synthesised
     from tubecert.spec import Setting, Spec
 
-_OF_SEARCH: Final = Fraction(1, 2)  # of the time that is given: the certification has the rest
+_OF_SEARCH: Final = 0.5  # of the time that is given: the certification has the rest
 _WORDS: Final = {
     "spec": SPEC,
-    "set_": SET,
+    "settings": SETTINGS,
     **words_of(certifying.certify),
-    "output": Text("The certificate; - is stdout.  [SPEC's stem.certificate.json]", "FILE", short="-o"),
+    "output": Text(
+        "The certificate; - is stdout.  [SPEC's stem.certificate.json]",
+        "FILE",
+        short="-o",
+        ending=".certificate.json",
+    ),
     "report": Text("A page about it, too: FILE.html or FILE.md; may be repeated.", "FILE", many=True),
 }
 
@@ -36,42 +41,42 @@ def certify(
     how: Output,
     spec: str,
     *,
-    set_: Sequence[Setting] = (),
-    output: str | None = None,
+    output: str,
+    settings: Sequence[Setting] = (),
     report: Sequence[str] = (),
     **asked: Any,
 ) -> ExitCode:
     """Prove the tube around the plan and find the smallest gains; always write the certificate."""
-    if seconds := asked.get("deadline"):
-        asked["deadline"] = Fraction(keeper.left_of(float(seconds), interrupted=True)) * _OF_SEARCH
     from tubecert import certificate
     from tubecert.cli import telling
     from tubecert.cli.report import check_pages, write_pages
     from tubecert.cli.telling import spare
     from tubecert.library.specification import Specification
+    from tubecert.library.stated import page_of
     from tubecert.spec import load
 
     metric = asked.get("metric")
-    target = output or f"{Path(spec).stem}.certificate.json"
-    certificate.check_target(target)
+    certificate.check_target(output)
     inputs = {"specification": spec, "metric file": metric}
-    spare(target, inputs)
-    check_pages(report, {**inputs, "certificate": None if target == certificate.STDOUT else target})
-    system = load(spec, set_)
-    if system.hardware is not None:
-        asked.pop("deadline", None)  # the command is ended then, whatever it does
-    kept = _kept_place(spec, system, target, synthesised=metric is None)
+    spare(output, inputs)
+    check_pages(report, {**inputs, "certificate": None if output == certificate.STDOUT else output})
+    system = load(spec, settings)
+    if left := asked.pop("deadline", None):
+        # a sampled loop has no search that could look at the time: the command is ended then, whatever it does
+        asked |= {} if system.hardware else {"deadline": left * _OF_SEARCH}
+    kept = _kept_place(spec, system, output, synthesised=metric is None)
     if kept is not None:
         telling.warn_of_size(system, how)
-    heard = telling.kept(lambda so_far: _will(so_far, kept))
-    with telling.shown(how) as progress, asked_by(heard=heard):
+    with telling.shown(how, telling.kept(lambda so_far: _will(so_far, kept))) as progress:
         found = certifying.certify(Specification(spec=system), **asked, progress=progress)
-    if target != certificate.STDOUT:
-        found.save(target)
+    if output != certificate.STDOUT:
+        found.save(output)
     new = _kept_metric(found, kept)
     write_pages(report, found.certificate)
-    written = [("certificate", target), *(("page", page) for page in report)]
-    _show(found, [*([("metric", new)] if new else []), *written, *_next(found, system, target)], how)
+    written = [("certificate", output), *(("page", page) for page in report), *_next(found, system, output)]
+    page = page_of(found.certificate, all_of_it=how.verbose)
+    data = found.text if how.json or output == certificate.STDOUT else None
+    telling.present(how, page, [("metric", new), *written] if new else written, data)
     return found.verdict.exit_code
 
 
@@ -82,7 +87,7 @@ def _next(found: Certification | SampledCertification, spec: Spec, target: str) 
         yield "next", f"tubecert recheck {name}"
         yield "", f"tubecert simulate {shlex.quote(spec.path)} --certificate {name}"
     if found.certified and exported:
-        yield "", f"tubecert export {name} -o {shlex.quote(spec.name)}.controller"
+        yield "", f"tubecert export {name} -o {shlex.quote(folder_of(target))}"
     else:
         yield "more", f"-v here; tubecert report {name}: a page with figures"
 
@@ -112,8 +117,7 @@ def _kept_place(file: str, system: Spec, beside: str, *, synthesised: bool) -> s
     spare(beside, {"plan": plan})
     if beside == certificate.STDOUT or not synthesised or system.metric or system.synthesis is None:
         return None
-    name = Path(beside).name.removesuffix(".json").removesuffix(".certificate")
-    target = str(Path(beside).with_name(f"{name}.metric.json"))
+    target = str(Path(folder_of(beside)).with_suffix(".metric.json"))
     certificate.check_target(target)
     spare(target, {"specification": file, "plan": plan})
     if Path(target).exists() and not _by_tubecert(target):
@@ -151,16 +155,3 @@ def _kept_metric(found: Certification | SampledCertification, target: str | None
         return None
     certificate.write(target, metric_file(found.result.safe_set, metric, solver).to_json())
     return target
-
-
-def _show(
-    found: Certification | SampledCertification, closing: Iterable[tuple[str, str]], how: Output
-) -> None:
-    """The page on stdout, with what is written and comes next; or the certificate, with the verdict on stderr."""
-    from tubecert import certificate
-    from tubecert.cli.telling import present
-    from tubecert.library.stated import page_of
-
-    lines, page = list(closing), page_of(found.certificate, all_of_it=how.verbose)
-    data = found.text if how.json or dict(lines)["certificate"] == certificate.STDOUT else None
-    present(how, page, lines, data)

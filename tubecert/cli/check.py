@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tubecert.asking import Choice, Exact, Flag, Text, refuse
+from tubecert.asking import ENDING, SETTINGS, Choice, Exact, Flag, Text, refuse
 from tubecert.cli import keeper
-from tubecert.cli.adapter import ENDING, SET, Output, command
+from tubecert.cli.adapter import Output, command
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.library.certifying import SCHEDULER
 
 if TYPE_CHECKING:
     from tubecert.checking import Checked, CheckOptions
-    from tubecert.executor import Executor
     from tubecert.report.terminal import Terminal
     from tubecert.spec import Setting, Spec
 
@@ -25,15 +25,15 @@ _SUFFIXES = {".yaml", ".yml"}
 _OF_SPECIFICATIONS = rb"""(?m)^\s*\{?\s*["']?(tubecert|safe_set)["']?\s*:"""
 _SHOWN = 5
 _WORST = (ExitCode.CERTIFIED, ExitCode.UNDECIDED, ExitCode.NOT_CERTIFIED, ExitCode.INVALID)
-_FORMATS: Final = ("text", "json", "github", "junit", "sarif")
+FORMATS: Final = ("text", "json", "github", "junit", "sarif")
 _WORDS: Final = {
     "specs": Text("Specifications, or folders with some.", "SPEC", place=True, many=True),
-    "format_": Choice("What to write.  [text; github in its workflows]", words=_FORMATS),
+    "format_": Choice("What to write.  [text; github in its workflows]", words=FORMATS),
     "certify": Flag("Certify, too, and compare with the file's expect."),
     "family": Text("Whether plans (CSV, or specifications) are of this family.", "FILE"),
     "strict": Flag("Warnings are errors."),
     "skip_others": Flag("Leave YAML files that are no specifications alone."),
-    "set_": SET,
+    "settings": SETTINGS,
     "jobs": Exact("Files checked at a time.", whole=True),
     "scheduler": SCHEDULER,
     "no_cache": Flag("Do not use what earlier checks have found."),
@@ -53,7 +53,7 @@ def check(
     family: str | None = None,
     strict: bool = False,
     skip_others: bool = False,
-    set_: Sequence[Setting] = (),
+    settings: Sequence[Setting] = (),
     jobs: int = 1,
     scheduler: str | None = None,
     no_cache: bool = False,
@@ -67,7 +67,7 @@ def check(
     """
     if how.json and format_ not in (None, "json"):
         refuse("--format", "", "--json and --format exclude each other")
-    if family is not None and set_:
+    if family is not None and settings:
         refuse("--set", "", "--set is not for plans of a family", "leave --family or --set out")
     from tubecert.checking import CheckOptions
     from tubecert.cli.guard import write_stdout
@@ -77,33 +77,39 @@ def check(
     if family is not None:
         results = _members(specs, family)
     else:
-        files, others = _sorted_out(list(_expand(specs)), {*specs} - {*_folders(specs)}, skip_others)
-        # on a cluster files are known by their places in the file system, not by where the command runs
-        files = files if scheduler is None else [str(Path(file).resolve()) for file in files]
+        files = list(dict.fromkeys(file for path in specs for file in _below(path)))
+        others = [
+            file for file in files if (skip_others or file not in specs) and not _is_specification(file)
+        ]
+        files = [file for file in files if file not in others]
         options = CheckOptions(
-            certify=certify, strict=strict, cached=not no_cache, settings=tuple(set_), gap=gap
+            certify=certify, strict=strict, cached=not no_cache, settings=tuple(settings), gap=gap
         )
         options = options if budget is None else replace(options, budget=budget)
-        executor = _executor(scheduler, jobs, len(files))
-        results = _checked(files, options, executor, how) if files else []
+        results = _checked(files, options, how, scheduler, jobs) if files else []
         results = [*results, *_skipped(others)] or _nothing(specs)
     chosen = format_ or ("json" if how.json else "github" if github.detected() else "text")
-    write_stdout(FORMATS[chosen](results, Terminal.stdout(color=how.color), quiet=how.quiet))
+    write_stdout(written(chosen, results, Terminal.stdout(color=how.color), quiet=how.quiet))
     keeper.tell({"said": True})
     if chosen == "github":
         github.append_step_summary(results)
     return max((result.code for result in results), key=_WORST.index)
 
 
-def _folders(paths: Sequence[str]) -> list[str]:
-    return [path for path in paths if Path(path).is_dir()]
-
-
-def _sorted_out(files: list[str], named: set[str], skip_others: bool) -> tuple[list[str], list[str]]:
-    """Files to be checked, and those that are no specifications; of files that were named only if that is asked for."""
-    others = [file for file in files if (skip_others or file not in named) and not _is_specification(file)]
-    left_out = {*others}
-    return [file for file in files if file not in left_out], others
+def _below(path: str) -> list[str]:
+    """A file, or the specifications below a folder; hidden ones, and links that lead out of it, are left alone."""
+    folder = Path(path)
+    if not folder.is_dir():
+        return [path]
+    root = folder.resolve()
+    return sorted(
+        str(file)
+        for file in folder.rglob("*")
+        if file.suffix in _SUFFIXES
+        and file.is_file()
+        and file.resolve().is_relative_to(root)
+        and not any(part.startswith(".") for part in file.relative_to(folder).parts)
+    )
 
 
 def _is_specification(file: str) -> bool:
@@ -119,120 +125,76 @@ def _is_specification(file: str) -> bool:
 
 def _skipped(others: Sequence[str]) -> list[Checked]:
     """What was left alone is said, once."""
-    from tubecert.checking import Checked
-    from tubecert.findings import Finding, Severity
+    from tubecert.findings import Severity
 
     if not others:
         return []
     what = "1 file is no specification" if len(others) == 1 else f"{len(others)} files are no specifications"
     shown = ", ".join(others[:_SHOWN]) + (", ..." if len(others) > _SHOWN else "")
-    finding = Finding(
-        code="TC123",
-        severity=Severity.NOTE,
-        message=f"{what} and {'was' if len(others) == 1 else 'were'} left alone: {shown}",
-        help="a specification has the keys tubecert, system and safe_set",
-    )
-    return [Checked(path=others[0], findings=(finding,), code=ExitCode.CERTIFIED)]
+    message = f"{what} and {'was' if len(others) == 1 else 'were'} left alone: {shown}"
+    help = "a specification has the keys tubecert, system and safe_set"
+    return _said(others[0], "TC123", message, help, severity=Severity.NOTE)
 
 
 def _nothing(paths: Sequence[str]) -> list[Checked]:
     """What there is to say where there is nothing to check."""
+    help = "give files, or folders that contain files *.yaml"
+    return _said(paths[0], "TC100", f"no specification in {', '.join(paths)}", help, ExitCode.INVALID)
+
+
+def _said(
+    path: str, code: str, message: str, help: str, end: ExitCode = ExitCode.CERTIFIED, **more: Any
+) -> list[Checked]:
     from tubecert.checking import Checked
     from tubecert.findings import Finding
 
-    finding = Finding(
-        code="TC100",
-        message=f"no specification in {', '.join(paths)}",
-        help="give files, or folders that contain files *.yaml",
-    )
-    return [Checked(path=paths[0], findings=(finding,), code=ExitCode.INVALID)]
+    finding = Finding(code=code, message=message, help=help, **more)
+    return [Checked(path=path, findings=(finding,), code=end)]
 
 
-def _executor(scheduler: str | None, jobs: int, files: int) -> Executor:
-    """The cluster, where there is one, or as many processes as are wanted."""
-    from tubecert.executor import chosen
-    from tubecert.library.workers import cluster_at
-
-    return chosen(jobs, files) if scheduler is None else cluster_at(scheduler)
-
-
-def _checked(files: Sequence[str], options: CheckOptions, executor: Executor, how: Output) -> list[Checked]:
+def _checked(
+    files: Sequence[str], options: CheckOptions, how: Output, scheduler: str | None, jobs: int
+) -> list[Checked]:
     """The results in the order of the files, whichever is ready first."""
     from functools import partial
 
     from tubecert.checking import check
     from tubecert.cli import telling
-    from tubecert.executor import Serial
+    from tubecert.executor import Serial, chosen
+    from tubecert.library.workers import cluster_at
     from tubecert.progress import Phase
-    from tubecert.report import progress
+    from tubecert.report.progress import Pieces
 
+    if scheduler is not None:  # there files are known by their places, not by where the command runs
+        files = [str(Path(file).resolve()) for file in files]
+    executor = chosen(jobs, len(files)) if scheduler is None else cluster_at(scheduler)
     with telling.shown(how) as report:
-        told = None if report is None else progress.Pieces(report, Phase.CHECK, len(files))
+        told = Pieces(report, Phase.CHECK, len(files))
 
         def ready(place: int, checked: Checked) -> None:
-            telling.found(
-                f"{checked.path}: {'; '.join(each.message for each in checked.findings) or 'no findings'}"
-            )
-            if told is not None:
-                told.ready(place, checked)
+            said = "; ".join(each.message for each in checked.findings) or "no findings"
+            telling.found(f"{checked.path}: {said}")
+            told.ready(place, checked)
 
         inner = told if isinstance(executor, Serial) else None  # other processes do not tell
         return executor.map(partial(check, options=options, progress=inner), files, ready)
 
 
-def _as_text(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
-    from tubecert.report.findings import render, summary
-
-    findings = [item for result in results for item in result.findings]
-    return terminal.text(render(() if quiet else findings, closing=summary(findings, len(results))))
-
-
-def _as_json(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
+def written(form: str, results: Sequence[Checked], terminal: Terminal, *, quiet: bool = False) -> str:
+    """Results as one of the `FORMATS`."""
     from tubecert.printable import printable_json
-    from tubecert.records import to_json
-    from tubecert.report.findings import as_data
+    from tubecert.report import findings
 
-    data = [to_json(as_data(item)) for result in results for item in result.findings]
-    return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
-
-
-def _as_report(name: str) -> Any:
-    """What the module of that name in `report` makes of results."""
-
-    def rendered(results: Sequence[Checked], terminal: Terminal, *, quiet: bool) -> str:
-        from importlib import import_module
-
-        text: str = import_module(f"tubecert.report.{name}").render(results)
-        return text
-
-    return rendered
-
-
-FORMATS: Final = {"text": _as_text, "json": _as_json, **{name: _as_report(name) for name in _FORMATS[2:]}}
-
-
-def _expand(paths: Sequence[str]) -> Iterator[str]:
-    """The files themselves, and those below folders, each once, in a fixed order."""
-    seen = set()
-    for path in paths:
-        found = _below(Path(path)) if Path(path).is_dir() else [path]
-        for file in found:
-            if file not in seen:
-                seen.add(file)
-                yield file
-
-
-def _below(folder: Path) -> list[str]:
-    """Specifications in a folder and its subfolders; hidden ones, and links that lead out of it, are left alone."""
-    root = folder.resolve()
-    return sorted(
-        str(file)
-        for file in folder.rglob("*")
-        if file.suffix in _SUFFIXES
-        and file.is_file()
-        and file.resolve().is_relative_to(root)
-        and not any(part.startswith(".") for part in file.relative_to(folder).parts)
-    )
+    found = [item for result in results for item in result.findings]
+    if form == "text":
+        closing = findings.summary(found, len(results))
+        return terminal.text(findings.render(() if quiet else found, closing=closing))
+    if form == "json":
+        return (
+            printable_json(json.dumps([*map(findings.as_data, found)], indent=1, ensure_ascii=False)) + "\n"
+        )
+    text: str = import_module(f"tubecert.report.{form}").render(results)
+    return text
 
 
 def _members(paths: Sequence[str], family: str) -> list[Checked]:

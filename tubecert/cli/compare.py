@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from tubecert.asking import Choice, Text, refuse
-from tubecert.cli.adapter import CERTIFICATE, Output, command
+from tubecert.asking import CERTIFICATE, Choice, Text, refuse
+from tubecert.cli.adapter import Output, command
 
 _FILES = "A page or a table: FILE.html (with figures), FILE.md, FILE.csv or FILE.json; may be repeated."
 _WORDS: Final = {
@@ -36,14 +36,14 @@ def compare(
     if certificates.count(STDIN) > 1:
         raise refused("- is given twice: one certificate can be on stdin", "give files")
     for target in output:
-        comparing.ending_of(target)
-        certificate.check_target(target, comparing.REMEDY)
+        comparing.Comparison.form_of(target)
+        certificate.check_target(target, comparing.Comparison.remedy)
         spare(target, {f"certificate {path}": path for path in certificates if path != STDIN})
     comparison = comparing.compare(*certificates)
     for target in output:
         comparison.save(target)
     if how.json or format_ != "text":
-        write_stdout(comparing.FORMATS[".json" if how.json else f".{format_}"](comparison))
+        write_stdout(getattr(comparison, "json" if how.json else format_))
         return
     written = [*(("page", target) for target in output), ("more", "-v here; -o FILE.html")]
     present(how, page_of(comparison.sides), written)

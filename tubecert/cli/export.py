@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tubecert.asking import Text
-from tubecert.cli.adapter import CERTIFICATE, Output, command
+from tubecert.asking import CERTIFICATE, Text
+from tubecert.cli.adapter import Output, command
 
 _WORDS = {
     "certificate": replace(CERTIFICATE, help="A certificate (JSON) of a sampled loop."),
@@ -20,10 +20,14 @@ def export(how: Output, certificate: str, *, output: str | None = None) -> None:
     from tubecert.library import exporting
     from tubecert.printable import visible
 
-    stem = certificate.removesuffix(".json").removesuffix(".certificate")
-    found = exporting.export(certificate, output or f"{stem}.controller")
+    found = exporting.export(certificate, output or folder_of(certificate))
     if not how.quiet:
         write_stdout(
             f"{visible(found.folder)}: {', '.join(found.files)}\n"
             f"  {found.work} multiply-adds a sample; README.txt says how to compile and what is covered\n"
         )
+
+
+def folder_of(certificate: str) -> str:
+    """Where the controller of a certificate goes: `plant.controller` for `plant.certificate.json`, beside it."""
+    return certificate.removesuffix(".json").removesuffix(".certificate") + ".controller"

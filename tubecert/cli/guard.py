@@ -64,9 +64,8 @@ def refuse_usage(error: Any) -> int:
 
     text = StringIO()
     error.show(file=text)
-    hint = usage_hint(error, sys.argv[1:])
     said = text.getvalue().replace("Value error, ", "")  # jargon of a library
-    _tell_as_is(printable_lines(said + hint).rstrip("\n"))
+    _tell_as_is(printable_lines(said + usage_hint(error, sys.argv[1:])).rstrip("\n"))
     return int(error.exit_code)
 
 

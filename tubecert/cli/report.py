@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tubecert.asking import Text, words_of
-from tubecert.cli.adapter import CERTIFICATE, Output, command
+from tubecert.asking import CERTIFICATE, Text, words_of
+from tubecert.cli.adapter import Output, command
 from tubecert.library import pages
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ def check_pages(targets: Sequence[str], taken: Mapping[str, str | None]) -> None
 
     kept = {what: path for what, path in taken.items() if path is not None}
     for page in targets:
-        pages.require_page(page)
-        certificate.check_target(page, pages.REMEDY)
+        pages.Report.form_of(page)
+        certificate.check_target(page, pages.Report.remedy)
         for what, path in kept.items():
             if Path(path).resolve() == Path(page).resolve() or certificate.same_file(page, path):
                 message = f"cannot write {page}: it is the {what} itself"

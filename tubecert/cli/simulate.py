@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tubecert.asking import METRIC, Exact, Text, flag, refuse, words_of
-from tubecert.cli.adapter import ENDING, SET, SPEC, Output, command
+from tubecert.asking import ENDING, METRIC, SETTINGS, SPEC, Exact, Text, flag, refuse, words_of
+from tubecert.cli.adapter import Output, command
 from tubecert.errors import ExitCode
 from tubecert.library import certifying, simulating
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
-    from tubecert.library.simulation import SampledSimulation, Simulation
     from tubecert.progress import Progress
     from tubecert.spec import Setting, Spec
 
-_CODES: Final = {
-    "falsified": ExitCode.NOT_CERTIFIED,
-    "tube left": ExitCode.NOT_CERTIFIED,
-    "no result": ExitCode.UNDECIDED,
-    "interrupted": ExitCode.INTERRUPTED,
-}
 _WITHOUT: Final = " (without --certificate)."
 _APART: Final = (
     ("certificate", "epsilon", "a certificate has its own epsilon and rho_a"),
     ("certificate", "rho_a", "a certificate has its own epsilon and rho_a"),
     ("certificate", "metric", "a certificate has its own metric"),
-    ("certificate", "set_", "a certificate has its own specification: --set goes without it"),
+    ("certificate", "settings", "a certificate has its own specification: --set goes without it"),
     ("plan", "members", "a plan of your own, or random ones: --plan, or --members"),
 )
 _WORDS: Final = {
@@ -40,10 +32,10 @@ _WORDS: Final = {
     "certificate": Text("Its certificate; without one, simulate certifies first.", "FILE"),
     **words_of(simulating.simulate),
     "metric": Text(f"A metric file, as for certify{_WITHOUT}", "FILE", sets="metric", of=METRIC),
-    "set_": SET,
+    "settings": SETTINGS,
     "epsilon": Exact(f"Overrides tube.epsilon{_WITHOUT}", sets="tube.epsilon", of=METRIC),
     "rho_a": Exact(f"Overrides tube.rho_a{_WITHOUT}", sets="tube.rho_a", of=METRIC),
-    "output": Text("Data and figures.  [SPEC's stem.simulation]", "FOLDER", short="-o"),
+    "output": Text("Data and figures.  [SPEC's stem.simulation]", "FOLDER", short="-o", ending=".simulation"),
     "deadline": ENDING,
 }
 
@@ -53,9 +45,9 @@ def simulate(
     how: Output,
     spec: str,
     *,
+    output: str,
     certificate: str | None = None,
-    set_: Sequence[Setting] = (),
-    output: str | None = None,
+    settings: Sequence[Setting] = (),
     metric: str | None = None,
     epsilon: Any = None,
     rho_a: Any = None,
@@ -63,30 +55,29 @@ def simulate(
 ) -> ExitCode:
     """Integrate the closed loops, attack the tube, draw figures. It can falsify a certificate, never support one."""
     certified_with = {"metric": metric, "epsilon": epsilon, "rho_a": rho_a}
-    given = {**asked, **certified_with, "certificate": certificate, "set_": set_ or None}
+    given = {**asked, **certified_with, "certificate": certificate, "settings": settings or None}
     for one, other, message in _APART:
         if given.get(one) is not None and given.get(other) is not None:
-            refuse(flag(other), "", message)
+            refuse(_WORDS[other].called or flag(other), "", message)
     from tubecert.cli import telling
     from tubecert.library.specification import Specification
     from tubecert.progress import Phase, Step
     from tubecert.simulation.folder import prepared
     from tubecert.spec import load
 
-    system = load(spec, set_)
+    system = load(spec, settings)
     simulating.require_ready(system)
-    folder = output or f"{Path(spec).stem}.simulation"
-    with prepared(folder), telling.shown(how) as progress:
+    with prepared(output), telling.shown(how) as progress:
         if certificate is None:
-            found = _certified(spec, system, folder, progress, **certified_with)
+            found = _certified(spec, system, output, progress, **certified_with)
         else:
             found = _read(certificate, system)
         simulation = simulating.simulate(found, spec=Specification(spec=system), **asked, progress=progress)
-        if progress is not None:
-            progress(Step(phase=Phase.FIGURES))
-        files = simulation.save(folder)
-    _show(simulation, folder, files, certificate or str(Path(folder) / "certificate.json"), how)
-    return _CODES.get(simulation.outcome, ExitCode.CERTIFIED)
+        progress(Step(phase=Phase.FIGURES))
+        files = simulation.save(output)
+    there = certificate or str(Path(output) / "certificate.json")
+    line = shlex.join(["tubecert", "report", there, "--simulation", output, "-o", f"{output}.html"])
+    return telling.answer(how, simulation, [("files", f"{output}: {', '.join(files)}"), ("next", line)])
 
 
 def _read(path: str, system: Spec) -> Certification | SampledCertification:
@@ -102,7 +93,7 @@ def _read(path: str, system: Spec) -> Certification | SampledCertification:
 
 
 def _certified(
-    file: str, system: Spec, folder: str, progress: Progress | None, **given: Any
+    file: str, system: Spec, folder: str, progress: Progress, **given: Any
 ) -> Certification | SampledCertification:
     """A new certificate, which is kept in the folder."""
     from tubecert.library.specification import Specification
@@ -115,19 +106,3 @@ def _certified(
     found = certifying.certify(Specification(spec=system), **given, progress=progress)
     found.save(Path(folder) / "certificate.json")
     return found
-
-
-def _show(
-    simulation: Simulation | SampledSimulation,
-    folder: str,
-    files: Sequence[str],
-    certificate: str,
-    how: Output,
-) -> None:
-    """The page, and the command that shows it beside what is proven."""
-    from tubecert.cli.telling import present
-
-    data = json.dumps(simulation.summary, indent=1, sort_keys=True, allow_nan=False) + "\n"
-    words = ["tubecert", "report", certificate, "--simulation", folder, "-o", f"{folder}.html"]
-    closing = [("files", f"{folder}: {', '.join(files)}"), ("next", shlex.join(words))]
-    present(how, simulation._page(), closing, data if how.json else None)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tubecert.asking import Text, asked_by, words_of
+from tubecert.asking import SETTINGS, SPEC, Text, words_of
 from tubecert.cli import keeper
-from tubecert.cli.adapter import SET, SPEC, Output, command
+from tubecert.cli.adapter import Output, command
 from tubecert.errors import ExitCode
 from tubecert.library import metrics
 
@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 
 _WORDS: Final = {
     "spec": SPEC,
-    "set_": SET,
+    "settings": SETTINGS,
     **words_of(metrics.synth),
     "plot": Text("Draw the comparison (SVG); implies --table.", "FILE"),
-    "output": Text("The metric file; - is stdout.  [SPEC's stem.metric.json]", "FILE", short="-o"),
+    "output": Text(
+        "The metric file; - is stdout.  [SPEC's stem.metric.json]", "FILE", short="-o", ending=".metric.json"
+    ),
 }
 
 
@@ -33,14 +35,12 @@ def synth(
     how: Output,
     spec: str,
     *,
-    set_: Sequence[Setting] = (),
-    output: str | None = None,
+    output: str,
+    settings: Sequence[Setting] = (),
     plot: str | None = None,
     **asked: Any,
 ) -> ExitCode:
     """Find a dual metric, round it, and write it only if C1-C3 are proven on the whole safe set."""
-    if seconds := asked.get("deadline"):
-        asked["deadline"] = keeper.left_of(float(seconds))
     from tubecert import certificate
     from tubecert.cli import telling
     from tubecert.cli.telling import plan_of, present, refused, spare
@@ -49,14 +49,13 @@ def synth(
     from tubecert.report.terminal import Terminal
     from tubecert.spec import load
 
-    target = output or f"{Path(spec).stem}.metric.json"
-    for place in filter(None, (target, plot)):
+    for place in filter(None, (output, plot)):
         certificate.check_target(place)
         spare(place, {"specification": spec})
     if plot and Path(plot).suffix.lower() != ".svg":
         raise refused(f"cannot write {plot}: the comparison is drawn as SVG", "give a file FILE.svg")
-    system = load(spec, set_, "plant")
-    spare(target, {"plan": plan_of(spec, system)})
+    system = load(spec, settings, "plant")
+    spare(output, {"plan": plan_of(spec, system)})
     terminal = Terminal.stderr(color=how.color)
 
     def judged(found: Synthesised) -> None:
@@ -64,20 +63,20 @@ def synth(
         if not how.quiet:
             terminal.show(text.headline(synthesis.page_of(found.search(), found.file, system.name)))
 
-    heard = telling.kept(lambda so_far: _will(so_far, system, target, how))
+    kept = telling.kept(lambda so_far: _will(so_far, system, output, how))
     telling.warn_of_size(system, how)
     asked["table"] = asked["table"] or plot is not None
-    with telling.shown(how) as progress, asked_by(judged=judged, heard=heard):
+    with telling.shown(how, kept, judged) as progress:
         metric = metrics.synth(Specification(spec=system), **asked, progress=progress)
     found = metric.found
-    if metric.proven and target != certificate.STDOUT:
-        metric.save(target)
+    if metric.proven and output != certificate.STDOUT:
+        metric.save(output)
     if plot and found.rows:
         from tubecert.report.figures_file import svg_file
         from tubecert.report.figures_gains import rate_figures
 
         certificate.write_text(plot, svg_file(*rate_figures(found.search().table)))
-    present(how, *_presented(found, system, target, how))
+    present(how, *_presented(found, system, output, how))
     if found.cut is not None and not metric.proven:
         keeper.tell({"said": False})  # where it was is worth a word
     return ExitCode.INTERRUPTED if found.cut == "interrupted" else found.verdict.exit_code

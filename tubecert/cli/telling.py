@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -14,7 +15,7 @@ from tubecert.claims.family import Reason
 from tubecert.cli import keeper
 from tubecert.cli.guard import write_stdout
 from tubecert.digits import exact, short
-from tubecert.errors import TargetError
+from tubecert.errors import ExitCode, TargetError
 from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.progress import Phase, Progress, Step
@@ -25,6 +26,7 @@ from tubecert.words.progress import came_to, described, next_step, out_of_reach
 if TYPE_CHECKING:
     from tubecert.certificate.result import MetricFile
     from tubecert.cli.adapter import Output
+    from tubecert.library.shown import Shown
     from tubecert.pipeline.synthesised import Row, Synthesised
     from tubecert.report.page import Page
     from tubecert.report.text import Rows
@@ -34,21 +36,49 @@ _EVERY: Final = 0.2  # s between two of the same search
 _CLAIMS: Final = (Phase.CERTIFICATION, Phase.GAINS)  # each name is one, and is done when the next begins
 
 
+def answered(how: Output, function: Callable[..., Shown], asked: Mapping[str, object]) -> ExitCode:
+    """What a function of the library gives, shown; the exit code."""
+    with shown(how) as progress:
+        more = {"progress": progress} if "progress" in inspect.signature(function).parameters else {}
+        found = function(**asked, **more)
+    return answer(how, found, found._closing())
+
+
+def answer(how: Output, found: Shown, closing: Rows) -> ExitCode:
+    """Shows what was found: its page, files and next commands, or its JSON; the exit code."""
+    data = found._json() if how.json else None
+    present(replace(how, quiet=how.quiet or (how.json and found.alone)), found._page(), closing, data)
+    return found._exit_code
+
+
 @contextlib.contextmanager
-def shown(how: Output) -> Iterator[Progress | None]:
-    """A callback of progress: shown unless that is not wanted, and kept; None where nobody hears it."""
+def shown(
+    how: Output,
+    kept: Callable[[Synthesised], None] | None = None,
+    judged: Callable[[Synthesised], None] | None = None,
+) -> Iterator[Told]:
+    """A callback of progress: shown unless that is not wanted, and told; it hears what is found as well."""
     terminal = Terminal.stderr(color=how.color)
     with progress.shown(terminal, wanted=not (how.no_progress or how.quiet)) as report:
-        yield Told(report) if keeper.told_to() else report
+        yield Told(report, kept, judged)
 
 
 @dataclass(slots=True)
 class Told:
-    """Passes steps on, and tells those that are new: where the command is, and what it found before."""
+    """Passes steps on, and tells those that are new: where the command is, and what it found before.
+
+    What else it hears (`asking.hears`): lines that it tells, too, and what a search has.
+    """
 
     shown: Progress | None
+    kept: Callable[[Synthesised], None] | None
+    judged: Callable[[Synthesised], None] | None
     last: Step | None = None
-    when: float = field(default=0.0)
+    when: float = 0.0
+
+    def found(self, line: str) -> None:
+        """A line about what was found."""
+        found(line)
 
     def __call__(self, step: Step) -> None:
         """A step."""

@@ -6,22 +6,22 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tubecert.asking import Flag, Text, words_of
-from tubecert.cli.adapter import ENDING, SET, Output, command
+from tubecert.asking import ENDING, SETTINGS, Flag, Text, words_of
+from tubecert.cli.adapter import Output, command
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.library import metrics
+from tubecert.printable import visible
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
     from tubecert.library.metrics import VerifiedMetric
-    from tubecert.report.terminal import Terminal
     from tubecert.spec import Setting, Spec
 
 _METRICS = (".json", ".csv", ".npz", ".mat")
 _WORDS: Final = {
     "files": Text("Specifications, and metrics after them.", "SPEC|METRIC...", place=True, many=True),
-    "set_": SET,
+    "settings": SETTINGS,
     **{name: kind for name, kind in words_of(metrics.verify).items() if name != "metric"},
     "deadline": ENDING,
     "output": Text("Write a metric file, if there is one metric and it holds.", "FILE", short="-o"),
@@ -34,7 +34,7 @@ def verify(
     how: Output,
     files: Sequence[str],
     *,
-    set_: Sequence[Setting] = (),
+    settings: Sequence[Setting] = (),
     output: str | None = None,
     expect: bool = False,
     **asked: Any,
@@ -49,56 +49,53 @@ def verify(
     from tubecert.report import progress, text, verification
     from tubecert.report.terminal import Terminal
 
-    cases = list(_cases(files, asked.get("rate"), set_))
+    cases = list(_cases(files, asked.get("rate"), settings))
     if output is not None:
         if len(cases) != 1:
             raise refused(f"-o takes one metric, and {len(cases)} were given", "verify them one by one")
         certificate.check_target(output)
         spare(output, {"input": cases[0][0], "specification": cases[0][1].path})
-    terminal, shown = Terminal.stderr(color=how.color), Terminal.stdout(color=how.color)
-    found: list[tuple[str, VerifiedMetric]] = []
+    shown = Terminal.stdout(color=how.color)
+    found: list[VerifiedMetric] = []
     for file, spec in cases:
         with telling.shown(how) as show:
-            told = show and progress.Pieces(show, Phase.VERIFICATION, len(cases), done=len(found))
-            metric = metrics.verify(Specification(spec=spec), **asked, progress=told)
-        found.append((file, metric))
+            told = progress.Pieces(show, Phase.VERIFICATION, len(cases), done=len(found))
+            found.append(metrics.verify(Specification(spec=spec), **asked, progress=told))
         if not how.json:  # one after the other: many metrics take their time
-            page = verification.page_of(file, metric.found)
+            page = verification.page_of(file, found[-1].found)
             one = [text.headline(page)] if how.quiet else text.screen(page, [], verbose=True)
             write_stdout(shown.text(one))
-    if output is not None and found[0][1].proven:
-        found[0][1].save(output)
+    if output is not None and found[0].proven:
+        found[0].save(output)
     if how.json:
-        write_stdout(verification.as_json([(file, metric.found) for file, metric in found]))
+        write_stdout(
+            verification.as_json([(file, own.found) for (file, _), own in zip(cases, found, strict=True)])
+        )
     elif not how.quiet:
-        write_stdout(_closing([metric for _, metric in found], output))
+        write_stdout(_closing(found, output))
     if expect:
-        return _as_locked([spec for _, spec in cases], [metric for _, metric in found], terminal)
-    codes = [metric.verdict.exit_code for _, metric in found]
+        return _as_locked(cases, found, how)
+    codes = [metric.verdict.exit_code for metric in found]
     return next((c for c in (ExitCode.NOT_CERTIFIED, ExitCode.UNDECIDED) if c in codes), ExitCode.CERTIFIED)
 
 
 def _closing(found: Sequence[VerifiedMetric], target: str | None) -> str:
     """How many there are of each verdict, and where a metric was written."""
-    from tubecert.printable import visible
-
     verdicts = [metric.verdict for metric in found]
     counts = ", ".join(f"{verdicts.count(each)} {each}" for each in dict.fromkeys(verdicts))
     many = f"\n{len(found)} metrics: {counts}\n" if len(found) > 1 else ""
     return many + (f"  metric file {visible(target)}\n" if target and found[0].proven else "")
 
 
-def _as_locked(specs: Sequence[Spec], found: Sequence[VerifiedMetric], terminal: Terminal) -> ExitCode:
+def _as_locked(cases: Sequence[tuple[str, Spec]], found: Sequence[VerifiedMetric], how: Output) -> ExitCode:
     """Certified if every metric is what the section `expect` of its specification says."""
     from tubecert.checking.expectations import metric_compared, outcome_of_metric
     from tubecert.report.findings import render
+    from tubecert.report.terminal import Terminal
 
-    pairs = zip(specs, found, strict=True)
-    wrong = [
-        each for spec, metric in pairs for each in metric_compared(spec, outcome_of_metric(metric.found))
-    ]
-    if wrong:
-        terminal.show(render(wrong))
+    pairs = [(spec, outcome_of_metric(metric.found)) for (_, spec), metric in zip(cases, found, strict=True)]
+    if wrong := [each for pair in pairs for each in metric_compared(*pair)]:
+        Terminal.stderr(color=how.color).show(render(wrong))
     return ExitCode.NOT_CERTIFIED if wrong else ExitCode.CERTIFIED
 
 
@@ -112,21 +109,17 @@ def _cases(
     from tubecert.spec import load
     from tubecert.spec.metric_file import with_metric
 
-    pending: tuple[str, Spec] | None = None
     system: Spec | None = None
-    for file in files:
-        if Path(file).suffix.lower() in _METRICS:
-            if system is None:
-                raise _no_system(file)
-            pending = None
-            yield file, metrics.at_rate(with_metric(system, file, rate), rate)
-        else:
-            if pending is not None:
-                yield pending[0], metrics.at_rate(pending[1], rate)
+    own = [Path(file).suffix.lower() in _METRICS for file in files]
+    for file, alone, follows in zip(files, own, [*own[1:], False], strict=True):
+        if not alone:
             system = load(file, settings, "system")
-            pending = file, system
-    if pending is not None:
-        yield pending[0], metrics.at_rate(pending[1], rate)
+            if not follows:
+                yield file, metrics.at_rate(system, rate)
+        elif system is None:
+            raise _no_system(file)
+        else:
+            yield file, metrics.at_rate(with_metric(system, file, rate), rate)
 
 
 def _no_system(file: str) -> TubecertError:

@@ -6,7 +6,6 @@ certificate says, and `recheck` tells whether that is so.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -17,9 +16,9 @@ from tubecert.certificate.result import Bound, Certificate, InputData, MetricDat
 from tubecert.enclosure.interval import Array
 from tubecert.kinds import name_of
 from tubecert.kinds.kind import SectionData
-from tubecert.library.specification import File, Specification
+from tubecert.library.specification import Specification
 from tubecert.library.stated import Stated, array, rounded_up
-from tubecert.records import FormError, Json
+from tubecert.records import Json
 from tubecert.report.gains import Gains, rows
 from tubecert.report.outline import widths
 from tubecert.report.page import Reason
@@ -159,20 +158,6 @@ class Certification(Stated[Certificate]):
 
     def _proven(self) -> Gains | None:
         return self.deciding if self.certified else None
-
-
-def read(path: File) -> Certification:
-    """The certificate in a file, of a loop that rests on a metric; raises `TargetError` for any other."""
-    source = os.fspath(path)
-    return read_sealed(file.load(source), source)
-
-
-def read_sealed(sealed: Json, source: str) -> Certification:
-    """The same of its JSON, whose format and hash are right; raises `TargetError` where it is no result."""
-    try:
-        return certification_of(sealed)
-    except FormError as error:  # with a hash that is right: somebody sealed what is no result
-        raise file.incomplete(source, str(error)) from error
 
 
 def certification_of(sealed: Json, given: Specification | None = None) -> Certification:

@@ -4,23 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tubecert.asking import (
-    METRIC,
-    SEARCH,
-    Choice,
-    Exact,
-    Number,
-    Source,
-    Text,
-    asker,
-    exact,
-    question,
-    require_nothing_of_a_metric,
-)
+from tubecert import asking
+from tubecert.asking import Number
 from tubecert.letters import ALL, words_of
 
 if TYPE_CHECKING:
@@ -30,13 +20,15 @@ if TYPE_CHECKING:
     from tubecert.library.specification import Specifiable
     from tubecert.progress import Progress
 
-BUDGET: Final = Exact("Boxes examined per claim before giving up.", whole=True, of=METRIC)
-DEADLINE: Final = Exact(
-    "Seconds after which the command ends, with the best metric that was found so far.", of=SEARCH
+BUDGET: Final = asking.Exact("Boxes examined per claim before giving up.", whole=True, of=asking.METRIC)
+DEADLINE: Final = asking.Seconds(
+    "Seconds after which the command ends, with the best metric that was found so far.", of=asking.SEARCH
 )
-SCHEDULER: Final = Text("Work on a running Dask cluster (extra: tubecert[cluster]).", "ADDRESS", of=SEARCH)
-METRIC_FILE: Final = Source(
-    "Metric file (JSON) in place of the specification's.", "FILE", sets="metric", of=METRIC
+SCHEDULER: Final = asking.Text(
+    "Work on a running Dask cluster (extra: tubecert[cluster]).", "ADDRESS", of=asking.SEARCH
+)
+METRIC_NAME: Final = asking.Text(
+    "Metric file (JSON) in place of the specification's.", "FILE", sets="metric", of=asking.METRIC
 )
 DECIDING: Final = (*words_of(), ALL)
 AUTO: Final = "auto"  # the gap of each constant by its effect
@@ -47,32 +39,34 @@ _GAP: Final = (
 )
 
 
-@question(
+@asking.question(
     {
-        "rho_a": Exact(
+        "rho_a": asking.Exact(
             "Radius left to the adaptation, a length over all states (overrides tube.rho_a).",
             sets="tube.rho_a",
-            of=METRIC,
+            of=asking.METRIC,
         ),
-        "epsilon": Exact(
+        "epsilon": asking.Exact(
             "Radius beyond the initial offset (overrides tube.epsilon; not beside half_widths).",
             sets="tube.epsilon",
-            of=METRIC,
+            of=asking.METRIC,
         ),
-        "metric": METRIC_FILE,
-        "conditions": Choice(
+        "metric": asking.Kind(METRIC_NAME.help, "FILE", sets="metric", of=asking.METRIC),
+        "conditions": asking.Choice(
             "Which certificate decides the verdict: 0 (none: no adaptation), A (26: the paper's), B (distance), "
             "or all of them; all are always computed.  [conditions.decides, or A]",
             words=DECIDING,
-            of=METRIC,
+            of=asking.METRIC,
         ),
-        "bandwidth": Exact("Judge this filter bandwidth, in rad/s.", moderate=True, of=METRIC),
-        "adaptation_rate": Exact("... with this adaptation rate.", moderate=True, of=METRIC),
-        "gap": Exact(_GAP, "NUMBER|auto", below=1, word=AUTO, of=METRIC),
+        "bandwidth": asking.Exact("Judge this filter bandwidth, in rad/s.", moderate=True, of=asking.METRIC),
+        "adaptation_rate": asking.Exact("... with this adaptation rate.", moderate=True, of=asking.METRIC),
+        "gap": asking.Exact(_GAP, "NUMBER|auto", below=1, word=AUTO, of=asking.METRIC),
         "budget": BUDGET,
-        "deadline": DEADLINE,
-        "jobs": Exact(
-            "Processes that share the boxes of a long search (none with hardware).", whole=True, of=SEARCH
+        "deadline": replace(DEADLINE, ends=True),
+        "jobs": asking.Exact(
+            "Processes that share the boxes of a long search (none with hardware).",
+            whole=True,
+            of=asking.SEARCH,
         ),
         "scheduler": SCHEDULER,
     },
@@ -113,7 +107,7 @@ def certify(
 
     whole = spec_of(spec)
     if whole.hardware is not None:
-        require_nothing_of_a_metric()
+        asking.require_nothing_of_a_metric()
         return sampled.certified(whole, timed(progress))
     from tubecert import certificate, pipeline
     from tubecert.executor import held
@@ -126,21 +120,26 @@ def certify(
     whole, file = (whole, None) if metric is None else with_metric(whole, metric)
     usual = Options()
     options = Options(
-        rho_a=exact(rho_a),
-        epsilon=exact(epsilon),
+        rho_a=asking.exact(rho_a),
+        epsilon=asking.exact(epsilon),
         metric=None if file is None else Path(file),
         conditions=conditions,
-        bandwidth=exact(bandwidth),
-        adaptation_rate=exact(adaptation_rate),
+        bandwidth=asking.exact(bandwidth),
+        adaptation_rate=asking.exact(adaptation_rate),
         by_effect=None if gap is None else gap == AUTO,
-        gap=exact(None if gap == AUTO else gap) or usual.gap,
+        gap=asking.exact(None if gap == AUTO else gap) or usual.gap,
         budget=budget or usual.budget,
     )
     run = ran("tubecert.certify")
     limit = None if deadline is None else pipeline.Deadline.after(float(deadline))
     with held(workers_of(jobs, scheduler)) as workers:
         result = pipeline.certify(
-            whole, options, timed(progress), deadline=limit, kept=asker().heard, workers=workers
+            whole,
+            options,
+            timed(progress),
+            deadline=limit,
+            kept=asking.hears(progress, "kept"),
+            workers=workers,
         )
     sealed = certificate.seal(result.to_json(), run())
     return certification_of(sealed, Specification(spec=overridden(whole, options)))
@@ -152,7 +151,7 @@ def ran(function: str) -> Callable[[], Mapping[str, object]]:
 
     started, clock = datetime.now(UTC), time.perf_counter()
     return lambda: {
-        "command": asker().command or function,
+        "command": asking.asker().command or function,
         "started": started.isoformat(timespec="seconds"),
         "seconds": round(time.perf_counter() - clock, 3),
         "versions": versions(),

@@ -4,34 +4,27 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import PurePath
 from types import MappingProxyType
-from typing import Final
+from typing import ClassVar
 
-from tubecert import certificate
 from tubecert.asking import refuse
 from tubecert.certificate.effective import Tree
-from tubecert.errors import TargetError
-from tubecert.findings import Finding
 from tubecert.library.certification import Certification
 from tubecert.library.reading import certificate_of
 from tubecert.library.sampled import SampledCertification
-from tubecert.library.shown import Shown
+from tubecert.library.shown import Paged
 from tubecert.library.specification import File
 from tubecert.printable import printable_json
-from tubecert.report import html, markdown
 from tubecert.report.comparison import Comparison as Sides
 from tubecert.report.comparison import page_of
 from tubecert.report.page import Page
 from tubecert.report.quantities import Value
 
-REMEDY: Final = "give a file FILE.html, FILE.md, FILE.csv or FILE.json in a folder that exists"
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Comparison(Shown):
+class Comparison(Paged):
     """What certificates say, side by side; every sequence is in the order in which they were given.
 
     `quantities`: each number or word that one of them has, by its key (`rho`, `half_width.px`,
@@ -40,6 +33,9 @@ class Comparison(Shown):
     """
 
     sides: Sides = field(repr=False)
+    forms: ClassVar[Mapping[str, str]] = {**Paged.forms, ".csv": "csv", ".json": "json"}
+    known = "a comparison is a page or a table"
+    remedy = "give a file FILE.html, FILE.md, FILE.csv or FILE.json in a folder that exists"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,33 +62,8 @@ class Comparison(Shown):
         """As JSON."""
         return printable_json(json.dumps(self.sides.json(), indent=1, ensure_ascii=False)) + "\n"
 
-    @property
-    def html(self) -> str:
-        """As a page."""
-        return html.render_page(page_of(self.sides))
-
-    @property
-    def markdown(self) -> str:
-        """As Markdown, for a pull request."""
-        return markdown.render_page(page_of(self.sides))
-
-    def save(self, path: File) -> None:
-        """Write a page or a table, by the ending of the name: .html, .md, .csv or .json. Raises `TargetError`."""
-        target = os.fspath(path)
-        certificate.write_text(target, FORMATS[ending_of(target)](self), REMEDY)
-
     def _page(self) -> Page:
         return page_of(self.sides)
-
-
-FORMATS: Final[Mapping[str, Callable[[Comparison], str]]] = {
-    ".html": lambda found: found.html,
-    ".htm": lambda found: found.html,
-    ".md": lambda found: found.markdown,
-    ".markdown": lambda found: found.markdown,
-    ".csv": lambda found: found.csv,
-    ".json": lambda found: found.json,
-}
 
 
 def compare(
@@ -111,12 +82,3 @@ def compare(
     files = [os.fspath(each) if isinstance(each, (str, os.PathLike)) else each.name for each in certificates]
     named = zip(names or files, found, strict=True)
     return Comparison(sides=Sides.of([(name, each.certificate) for name, each in named]))
-
-
-def ending_of(target: str) -> str:
-    """How the name of a file ends; raises `TargetError` for what a comparison cannot be written as."""
-    ending = PurePath(target).suffix.lower()
-    if ending not in FORMATS:
-        message = f"cannot write {target}: a comparison is a page or a table"
-        raise TargetError([Finding(code="TC120", message=message, help=REMEDY)])
-    return ending

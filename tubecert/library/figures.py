@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tubecert.asking import require_installed
 from tubecert.certificate.result import Result
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
@@ -46,12 +47,9 @@ def _axes(ax: Axes | None) -> Axes:
     """The axes to draw into; new ones of pyplot, which notebooks show, if there are none."""
     if ax is not None:
         return ax
-    try:
-        import matplotlib.pyplot as plt
-    except ImportError:
-        message = "figures need matplotlib"
-        help = "install tubecert with its extra: pip install 'tubecert[simulate]'"
-        raise SpecError([Finding(code="TC122", message=message, help=help)]) from None
+    require_installed("matplotlib", "simulate", "figures need")
+    import matplotlib.pyplot as plt
+
     _, axes = plt.subplots(layout="constrained")
     return axes
 

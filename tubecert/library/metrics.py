@@ -7,20 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from tubecert.asking import (
-    Choice,
-    Exact,
-    Flag,
-    Names,
-    Number,
-    Source,
-    Text,
-    asker,
-    exact,
-    named,
-    question,
-    refuse,
-)
+from tubecert import asking
+from tubecert.asking import Number
 from tubecert.errors import SpecError
 from tubecert.library.certifying import BUDGET, DEADLINE
 from tubecert.library.shown import Shown
@@ -50,20 +38,18 @@ _OF_SECTION: Final = (
 class _Metric(Shown):
     """A metric on a safe set, as far as it is known: `found` has it all."""
 
-    found: Any = field(repr=False)
+    found: Synthesised | Verified = field(repr=False)
     name: str
 
     @property
     def verdict(self) -> Verdict:
         """`certified`: C1-C3 are proven; `refuted`: they fail, or no metric has the rate; else `undecided`."""
-        found: Verdict = self.found.verdict
-        return found
+        return self.found.verdict
 
     @property
     def file(self) -> MetricFile | None:
         """The metric as its file has it, None if nothing is proven."""
-        file: MetricFile | None = self.found.file
-        return file
+        return self.found.file
 
     @property
     def proven(self) -> bool:
@@ -78,7 +64,7 @@ class _Metric(Shown):
     @property
     def reason(self) -> str:
         """What fails, or why there is no metric, in words; empty if nothing does."""
-        return "" if self.found.reason is None else str(self.found.reason.sentence)
+        return "" if self.found.reason is None else self.found.reason.sentence
 
     def text(self) -> str:
         """The metric file. Raises `TubecertError` if nothing is proven."""
@@ -169,10 +155,10 @@ def with_metric(spec: Spec, metric: MetricLike, rate: Fraction | None = None) ->
     return metric_file.with_metric(spec, path, rate), os.path.basename(path)
 
 
-@question({
-    "metric": Source("The metric, in place of the specification's.", "METRIC"),
-    "rate": Exact("Decide at this rate, in 1/s, in place of the metric's own."),
-    "gap": Exact("Relative width to which the largest rate is enclosed.", below=1),
+@asking.question({
+    "metric": asking.Kind("The metric, in place of the specification's.", "METRIC"),
+    "rate": asking.Exact("Decide at this rate, in 1/s, in place of the metric's own."),
+    "gap": asking.Exact("Relative width to which the largest rate is enclosed.", below=1),
     "budget": BUDGET,
 })  # fmt: skip
 def verify(
@@ -196,10 +182,10 @@ def verify(
 
     whole, name = spec_of(spec, reads="system"), ""
     if metric is not None:
-        whole, name = with_metric(whole, metric, exact(rate))
+        whole, name = with_metric(whole, metric, asking.exact(rate))
     effort = Effort(gap=float(gap), budget=budget or _BUDGET)
     return VerifiedMetric(
-        found=decided(at_rate(whole, exact(rate)), effort, timed(progress)), name=name or whole.name
+        found=decided(at_rate(whole, asking.exact(rate)), effort, timed(progress)), name=name or whole.name
     )
 
 
@@ -214,27 +200,27 @@ def at_rate(spec: Spec, rate: Fraction | None) -> Spec:
     return spec if rate is None else replace(spec, metric=replace(spec.metric, rate=rate))
 
 
-@question({
-    "rate": Exact("Contraction rate, in 1/s."),
-    "objective": Choice(
+@asking.question({
+    "rate": asking.Exact("Contraction rate, in 1/s."),
+    "objective": asking.Choice(
         "What is best. At a rate: the least condition number, the greatest margin. Else the rate that "
         "gives the least adaptation rate or the smallest tube, or the greatest rate.",
         words=("condition", "margin", "rate", "adaptation", "tube"),
     ),
-    "degree": Exact("Degree of W(x).  [raised until it works]", whole=True, least=0, most=8),
-    "variables": Names("States that W depends on, e.g. x1,x3.  [chosen]", "NAMES"),
-    "condition_number": Exact("Not to be exceeded on the safe set."),
-    "coordinates": Choice(
+    "degree": asking.Exact("Degree of W(x).  [raised until it works]", whole=True, least=0, most=8),
+    "variables": asking.Names("States that W depends on, e.g. x1,x3.  [chosen]", "NAMES"),
+    "condition_number": asking.Exact("Not to be exceeded on the safe set."),
+    "coordinates": asking.Choice(
         "In which the condition number counts; auto: half-widths of the safe set.  [auto]",
         words=("auto", "identity"),
     ),
-    "route": Choice("How metrics are found.  [auto]", words=("auto", "sos", "cegis")),
-    "solver": Text(
+    "route": asking.Choice("How metrics are found.  [auto]", words=("auto", "sos", "cegis")),
+    "solver": asking.Text(
         "Which solver proposes; NAME: one that cvxpy knows.  [clarabel]", "<clarabel|scs|cvxpy:NAME>"
     ),
-    "table": Flag("Compare metrics over a range of rates."),
-    "rho_a": Exact("Overrides tube.rho_a.", sets="tube.rho_a"),
-    "epsilon": Exact("Overrides tube.epsilon.", sets="tube.epsilon"),
+    "table": asking.Flag("Compare metrics over a range of rates."),
+    "rho_a": asking.Exact("Overrides tube.rho_a.", sets="tube.rho_a"),
+    "epsilon": asking.Exact("Overrides tube.epsilon.", sets="tube.epsilon"),
     "budget": BUDGET,
     "deadline": DEADLINE,
 })  # fmt: skip
@@ -266,11 +252,11 @@ def synth(
     from tubecert.library.specification import require_once, settings_in, spec_of
     from tubecert.report.progress import timed
 
-    system, given = spec_of(spec, reads="plant"), asker().given
+    system, given = spec_of(spec, reads="plant"), asking.asker().given
     require_once(settings_in(system))
     # metrics are compared end to end by what the specification decides, else by the distance form
     decides = system.decides or DISTANCE.option
-    options = pipeline.Options(rho_a=exact(rho_a), epsilon=exact(epsilon), conditions=decides)
+    options = pipeline.Options(rho_a=asking.exact(rho_a), epsilon=asking.exact(epsilon), conditions=decides)
     said: Any = {name: given[name] for name in _OF_SECTION if given.get(name) is not None}
     found = pipeline.synthesise(
         system,
@@ -279,12 +265,12 @@ def synth(
         timed(progress),
         table=table,
         deadline=None if deadline is None else pipeline.Deadline.after(float(deadline)),
-        told=asker().judged,
-        kept=asker().heard,
+        told=asking.hears(progress, "judged"),
+        kept=asking.hears(progress, "kept"),
         # a tube that needs no adaptation is enough where neither an objective nor another certificate is asked for
         enough=objective is None and system.decides in (None, ALONE.option),
     )
-    if found.cut == "interrupted" and found.file is None and asker().judged is None:
+    if found.cut == "interrupted" and found.file is None and not asking.asker().options:
         raise KeyboardInterrupt
     return SynthesisedMetric(found=found, name=system.name, states=system.states)
 
@@ -315,16 +301,18 @@ def wanted_of(
     elif rate is not None and objective is None and own.rate is None:
         best = "condition"
     if best == "rate" and rate is not None:
-        text = f"the objective rate searches for the rate; {named('rate')} cannot be given"
-        refuse(named("objective"), "rate", text)
+        text = f"the objective rate searches for the rate; {asking.named('rate')} cannot be given"
+        asking.refuse(asking.named("objective"), "rate", text)
     if best in ("condition", "margin") and wanted is None:
-        refuse(named("objective"), best, f"the objective {best} needs {named('rate')}, in 1/s")
+        asking.refuse(
+            asking.named("objective"), best, f"the objective {best} needs {asking.named('rate')}, in 1/s"
+        )
     if solver is not None and said.setdefault("solver", solver_name(solver)) is None:
         known = "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows"
-        refuse(named("solver"), solver, known)
+        asking.refuse(asking.named("solver"), solver, known)
     if variables is not None:
         said["variables"] = variables
         if strange := [name for name in variables if name not in system.states]:
             known = f"{strange[0]} is no state; the states are {', '.join(system.states)}"
-            refuse(named("variables"), ",".join(variables), known)
+            asking.refuse(asking.named("variables"), ",".join(variables), known)
     return replace(own, **said, rate=wanted, objective=best, outputs=own.outputs if best == "tube" else ())

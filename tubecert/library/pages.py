@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Final
 
@@ -12,50 +12,31 @@ from tubecert.asking import Text, question
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.reading import certificate_of
+from tubecert.library.shown import Paged
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
     from tubecert.library.specification import File
+    from tubecert.report.page import Page
     from tubecert.report.page_simulation import Simulated
     from tubecert.report.quantities import AnyCertificate
 
-HTML, MARKDOWN = (".html", ".htm"), (".md", ".markdown")
-REMEDY: Final = "give a file FILE.html or FILE.md in a folder that exists"
 _HELP: Final = "give a folder that tubecert simulate --certificate wrote for this certificate"
 _MOST: Final = 20_000_000  # bytes of a file in such a folder
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Report(Paged):
     """The page of a certificate; the same for the same certificate."""
 
-    certificate: AnyCertificate = field(repr=False)
-    simulated: Simulated | None = field(default=None, repr=False)
+    certificate: AnyCertificate
+    simulated: Simulated | None = None
 
-    @property
-    def html(self) -> str:
-        """The page as one HTML file that needs nothing else."""
+    def _page(self) -> Page:
         from tubecert.library.stated import page_of
-        from tubecert.report import html
 
-        return html.render_page(page_of(self.certificate, self.simulated))
-
-    @property
-    def markdown(self) -> str:
-        """The same words and tables as Markdown, without figures."""
-        from tubecert.library.stated import page_of
-        from tubecert.report import markdown
-
-        return markdown.render_page(page_of(self.certificate, self.simulated))
-
-    def save(self, path: File) -> None:
-        """Write the page: FILE.html or FILE.md. Raises `TargetError`."""
-        from tubecert.certificate.file import write_text
-
-        target = os.fspath(path)
-        require_page(target)
-        write_text(target, self.markdown if _suffix(target) in MARKDOWN else self.html, REMEDY)
+        return page_of(self.certificate, self.simulated)
 
     def save_figures(self, folder: File) -> list[str]:
         """Write every figure into a folder, as SVG, PDF and PNG, and what they show as captions.md; their names.
@@ -65,10 +46,9 @@ class Report:
         from importlib.util import find_spec
 
         from tubecert.certificate.file import write_bytes
-        from tubecert.library.stated import page_of
         from tubecert.report.figures_file import painted, svg_file
 
-        told = page_of(self.certificate, self.simulated).figures
+        told = self._page().figures
         data = {f"{each.key}.svg": svg_file(each).encode() for each in told}
         if find_spec("matplotlib") is not None:
             data |= {
@@ -77,7 +57,7 @@ class Report:
         os.makedirs(folder, exist_ok=True)
         data["captions.md"] = "".join(f"- {each.key}: {each.told}\n" for each in told).encode()
         for name, content in data.items():
-            write_bytes(os.path.join(os.fspath(folder), name), content, REMEDY)
+            write_bytes(os.path.join(os.fspath(folder), name), content, self.remedy)
         return list(data)
 
     def __repr__(self) -> str:
@@ -122,14 +102,3 @@ def _simulated_in(folder: str, certificate: AnyCertificate) -> Simulated:
 
 def _refused(code: str, message: str) -> TargetError:
     return TargetError([Finding(code=code, message=message, help=_HELP)])
-
-
-def require_page(target: str) -> None:
-    """Raises `TargetError` for a name that is none of a page."""
-    if _suffix(target) not in (*HTML, *MARKDOWN):
-        message = f"cannot write {target}: a page is HTML or Markdown"
-        raise TargetError([Finding(code="TC120", message=message, help=REMEDY)])
-
-
-def _suffix(target: str) -> str:
-    return os.path.splitext(target)[1].lower()

@@ -35,13 +35,6 @@ _ATOMS: Final = ("is_Symbol", "is_Rational", "is_Float")
 
 
 @runtime_checkable
-class _Array(Protocol):
-    """An array, or a matrix of sympy."""
-
-    def tolist(self) -> object: ...
-
-
-@runtime_checkable
 class _Expression(Protocol):
     """An expression of sympy."""
 
@@ -75,7 +68,7 @@ def _plain(value: object, path: str, depth: int) -> Plain:
         return [_plain(item, f"{path}[{i}]", depth + 1) for i, item in enumerate(value)]
     if not _is(value, "is_Float") and (text := plain_number(value)) is not None:
         return text
-    if isinstance(value, _Array):
+    if hasattr(value, "tolist"):  # an array, or a matrix of sympy
         found = _plain(value.tolist(), path, depth + 1)
         return _vector(found) if path in _VECTORS else found
     if isinstance(value, _Expression):
@@ -87,16 +80,12 @@ def _plain(value: object, path: str, depth: int) -> Plain:
 
 def _vector(value: Plain) -> Plain:
     """The entries of a matrix with one column or one row; anything else as it is."""
-    if not isinstance(value, list) or not all(isinstance(row, list) for row in value):
+    rows = [row for row in value if isinstance(row, list)] if isinstance(value, list) else []
+    if not rows or rows != value:
         return value
-    rows = [row for row in value if isinstance(row, list)]
-    return (
-        [row[0] for row in rows]
-        if all(len(row) == 1 for row in rows)
-        else rows[0]
-        if len(rows) == 1
-        else value
-    )
+    if all(len(row) == 1 for row in rows):
+        return [row[0] for row in rows]
+    return rows[0] if len(rows) == 1 else value
 
 
 def _mapping(value: Data, path: str, depth: int) -> dict[str, Plain]:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shlex
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from tubecert.asking import Exact, Number, Source, Text, asker, named, question, text_of
+from tubecert import asking
+from tubecert.asking import Number
 from tubecert.errors import ExitCode
 from tubecert.library.shown import Shown
 
@@ -17,6 +22,7 @@ if TYPE_CHECKING:  # of the producer, which takes longer to import than many cer
     from tubecert.recheck.document import Node
     from tubecert.recheck.run import Examined, Recheck, Report
     from tubecert.report.page import Page
+    from tubecert.report.text import Rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -29,6 +35,7 @@ class Rechecked(Shown):
     found: Recheck = field(repr=False)
     name: str
     belongs: str = ""
+    alone = True
 
     @property
     def confirmed(self) -> bool:
@@ -55,12 +62,40 @@ class Rechecked(Shown):
 
         return page_of(self.found, self.name, self.belongs)
 
+    def _closing(self) -> Rows:
+        report = f"tubecert report {shlex.quote(self.name)}"
+        return [("more", f"-v here; {report}: what is certified, as a page with figures")]
 
-@question({
-    "spec": Source("Also: that the certificate is of this specification.", "SPEC"),
-    "budget": Exact("Boxes examined per claim before giving up.  [200000]", whole=True),
-    "deadline": Exact("Seconds after which what is not proven is undecided."),
-    "controller": Text("Also: that what export wrote there is of the certificate.", "FOLDER"),
+    def _json(self) -> str:
+        from tubecert.printable import printable_json
+
+        claims = [
+            {"claim": each.name, "verdict": each.outcome.verdict, "why": each.outcome.why, "boxes": each.outcome.boxes}
+            for each in self.claims
+        ]  # fmt: skip
+        data = {
+            "certificate": self.name,
+            "verdict": self.verdict,
+            "stated": self.found.stated,
+            "hash": self.found.hash,
+            "claims": claims,
+            "first_failing": None if self.first_failing is None else self.first_failing.name,
+            "not_examined": list(self.found.unread),
+            **({"specification": self.belongs} if self.belongs else {}),
+        }
+        return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
+
+    @property
+    def _exit_code(self) -> ExitCode:
+        return self.found.exit_code
+
+
+@asking.question({
+    "result": replace(asking.CERTIFICATE, help="A certificate (JSON); - is stdin."),
+    "spec": asking.Kind("Also: that the certificate is of this specification.", "SPEC"),
+    "budget": asking.Exact("Boxes examined per claim before giving up.  [200000]", whole=True),
+    "deadline": asking.Seconds("Seconds after which what is not proven is undecided."),
+    "controller": asking.Text("Also: that what export wrote there is of the certificate.", "FOLDER"),
 })  # fmt: skip
 def recheck(
     result: Stated[Any] | File,
@@ -71,11 +106,12 @@ def recheck(
     controller: File | None = None,
     progress: Progress | None = None,
 ) -> Rechecked:
-    """Examines every claim of a certificate, or of the file of one, in ball arithmetic and without a solver.
+    """Verify every claim of a certificate again: in ball arithmetic, with derivatives of its own, without a solver.
 
-    `spec`: also that it is of this specification (else TC604 is raised). `budget`: boxes per claim before giving up;
-    what is not proven `deadline` s from now is undecided. `controller`: a folder that `export` wrote, whose code and
-    numbers are compared with the certificate of a sampled loop. Raises `TubecertError` for what is no certificate.
+    `result`: the certificate, or its file. `spec`: also that it is of this specification (else TC604 is raised).
+    `budget`: boxes per claim before giving up; what is not proven `deadline` s from now is undecided. `controller`: a
+    folder that `export` wrote, whose code and numbers are compared with the certificate of a sampled loop. Raises
+    `TubecertError` for what is no certificate.
     """
     from tubecert.recheck.run import BUDGET
     from tubecert.recheck.run import recheck as examined
@@ -84,17 +120,17 @@ def recheck(
     if isinstance(text := getattr(result, "text", None), str):
         name = str(getattr(result, "name", ""))
     else:
-        name = text_of("result", result)
+        name = asking.text_of("result", result)
         text = _text_of(name)
     note = "" if spec is None else _specified(text, name, spec)
-    shown = timed(progress)
+    shown, line = timed(progress), asking.hears(progress, "found")
     found = examined(
         text,
         name,
         budget or BUDGET,
         None if shown is None else _told(shown),
         seconds=None if deadline is None else float(deadline),
-        heard=asker().heard,
+        heard=None if line is None else partial(_heard, line),
     )
     if controller is not None:
         found = _with_controller(found, text, name, os.fspath(controller))
@@ -149,7 +185,7 @@ def _with_controller(found: Recheck, text: str, name: str, folder: str) -> Reche
 
     own = document.read(text, name)
     if own.mapping()["format"] != document.SAMPLED_LOOP:
-        help = f"leave {named('controller')} out, or give the certificate of a specification with hardware"
+        help = f"leave {asking.named('controller')} out, or give the certificate of a specification with hardware"
         raise document.wrong("TC601", f"{name} is about a loop in continuous time, which has no code", help)
     more = (Examined(*each) for each in exported(own, folder))
     return replace(found, claims=(*found.claims, *more))
@@ -165,6 +201,12 @@ def _text_of(name: str) -> str:
         return data.decode()
     except UnicodeDecodeError:
         raise unreadable(name, "it is not UTF-8") from None
+
+
+def _heard(found: Callable[[str], None], item: Examined) -> None:
+    """Tells in a line what was found of a claim."""
+    why = "" if item.outcome.holds else f": {item.outcome.why}"
+    found(f"{item.outcome.verdict:<12}  {item.name}{why}")
 
 
 def _told(progress: Progress) -> Report:

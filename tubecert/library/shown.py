@@ -2,18 +2,39 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from tubecert.errors import ExitCode, TargetError
+from tubecert.findings import Finding
 
 if TYPE_CHECKING:
     from tubecert.report.page import Page
+    from tubecert.report.text import Rows
 
 
 class Shown:
-    """What shows itself by its page: in a line, and as a card in notebooks."""
+    """What shows itself by its page: in a line, as a card in notebooks, and as the answer of a command.
+
+    `alone`: its JSON says the verdict itself, and stands without its line.
+    """
 
     __slots__ = ()
+    alone: ClassVar[bool] = False
+
+    @property
+    def _exit_code(self) -> ExitCode:
+        return ExitCode.CERTIFIED
 
     def _page(self) -> Page:
+        raise NotImplementedError
+
+    def _closing(self) -> Rows:
+        """What was written, and the commands that come next: each with its heading."""
+        return ()
+
+    def _json(self) -> str:
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -28,3 +49,50 @@ class Shown:
         from tubecert.report import notebook
 
         return notebook.of_page(self._page())
+
+
+class Paged(Shown):
+    """What is kept as a page.
+
+    `forms`: by the ending of a file's name what it holds; `known`: these in words, and `remedy`: what to do instead.
+    """
+
+    __slots__ = ()
+    forms: ClassVar[Mapping[str, str]] = {
+        ".html": "html",
+        ".htm": "html",
+        ".md": "markdown",
+        ".markdown": "markdown",
+    }
+    known: ClassVar[str] = "a page is HTML or Markdown"
+    remedy: ClassVar[str] = "give a file FILE.html or FILE.md in a folder that exists"
+
+    @property
+    def html(self) -> str:
+        """The page as one HTML file that needs nothing else."""
+        from tubecert.report.html import render_page
+
+        return render_page(self._page())
+
+    @property
+    def markdown(self) -> str:
+        """The same words and tables as Markdown, without figures: for a pull request."""
+        from tubecert.report.markdown import render_page
+
+        return render_page(self._page())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write it, by the ending of the name. Raises `TargetError`."""
+        from tubecert.certificate.file import write_text
+
+        target = os.fspath(path)
+        write_text(target, getattr(self, self.form_of(target)), self.remedy)
+
+    @classmethod
+    def form_of(cls, target: str) -> str:
+        """What a file of this name holds; raises `TargetError` for a name by which it cannot be written."""
+        ending = os.path.splitext(target)[1].lower()
+        if ending not in cls.forms:
+            message = f"cannot write {target}: {cls.known}"
+            raise TargetError([Finding(code="TC120", message=message, help=cls.remedy)])
+        return cls.forms[ending]

@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final, cast
 
-from tubecert.asking import (
-    METRIC,
-    SEARCH,
-    Choice,
-    Exact,
-    Names,
-    Number,
-    Text,
-    asker,
-    exact,
-    named,
-    question,
-    require_nothing_of_a_metric,
-)
+from tubecert import asking
+from tubecert.asking import Number
 from tubecert.errors import SpecError, TubecertError
 from tubecert.findings import Finding
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
@@ -40,39 +27,39 @@ if TYPE_CHECKING:
     from tubecert.simulation.adaptive.setting import Setting
     from tubecert.spec import Spec
 
-EXTRA: Final = ("matplotlib",)
+EXTRA: Final = "matplotlib"
 RUNS: Final = 100
 MEMBERS: Final = 20  # random plans of a family
 
 
-@question({
-    "controllers": Names(
+@asking.question({
+    "controllers": asking.Names(
         "Loops, separated by commas: nominal, ccm, reference, l1.  [ccm,l1]",
         "NAMES",
         words=("nominal", "ccm", "reference", "l1"),
         what="controller",
-        of=METRIC,
+        of=asking.METRIC,
     ),
-    "gains": Choice(
-        "The certificate whose gains are taken.  [distance]", words=tuple(words_of(ADAPTIVE)), of=METRIC
+    "gains": asking.Choice(
+        "The certificate whose gains are taken.  [distance]", words=tuple(words_of(ADAPTIVE)), of=asking.METRIC
     ),
-    "runs": Exact("Random runs against each loop that adapts; 0: no attacks.  [100]", whole=True, least=0),
-    "jobs": Exact("Vectors of 128 runs at a time; not with hardware.", whole=True, of=SEARCH),
+    "runs": asking.Exact("Random runs against each loop that adapts; 0: no attacks.  [100]", whole=True, least=0),
+    "jobs": asking.Exact("Vectors of 128 runs at a time; not with hardware.", whole=True, of=asking.SEARCH),
     "scheduler": SCHEDULER,
-    "seed": Exact("Seed of the random runs and of the adversary.  [0]", whole=True, least=0),
-    "replay": Exact(
+    "seed": asking.Exact("Seed of the random runs and of the adversary.  [0]", whole=True, least=0),
+    "replay": asking.Exact(
         "Draw this random run in place of the specification's h; not with hardware.",
         whole=True,
         least=0,
-        of=METRIC,
+        of=asking.METRIC,
     ),
-    "members": Exact(
-        "Of a family without hardware: random plans that share the runs.  [20]", whole=True, of=METRIC
+    "members": asking.Exact(
+        "Of a family without hardware: random plans that share the runs.  [20]", whole=True, of=asking.METRIC
     ),
-    "plan": Text("... this plan (CSV or specification), if it is one.", "FILE", of=METRIC),
-    "duration": Exact("How long, in s.  [the horizon, else 10/rate]"),
-    "bandwidth": Exact("Choose the filter bandwidth, in rad/s.", moderate=True, of=METRIC),
-    "adaptation_rate": Exact("Choose the adaptation rate of l1.", moderate=True, of=METRIC),
+    "plan": asking.Text("... this plan (CSV or specification), if it is one.", "FILE", of=asking.METRIC),
+    "duration": asking.Exact("How long, in s.  [the horizon, else 10/rate]"),
+    "bandwidth": asking.Exact("Choose the filter bandwidth, in rad/s.", moderate=True, of=asking.METRIC),
+    "adaptation_rate": asking.Exact("Choose the adaptation rate of l1.", moderate=True, of=asking.METRIC),
 })  # fmt: skip
 def simulate(
     result: Certification | SampledCertification | File,
@@ -107,7 +94,7 @@ def simulate(
     system = _certified(found) if spec is None else spec_of(spec)
     require_ready(system)
     if isinstance(found, SampledCertification):
-        return _sampled(found, system, timed(progress), duration=exact(duration), runs=runs, seed=seed)
+        return _sampled(found, system, timed(progress), duration=asking.exact(duration), runs=runs, seed=seed)
     from tubecert.executor import Serial
     from tubecert.library.simulation import Simulation
     from tubecert.library.workers import workers_of
@@ -119,11 +106,11 @@ def simulate(
     default, system = system.simulation or Section(), adopted(system, found.result)
     require_tube(found.result)
     runs, seed = _first(runs, default.runs, RUNS), _first(seed, default.seed, 0)
-    setting, drawing = _setting(system, found.result, exact(duration), seed, plan)
+    setting, drawing = _setting(system, found.result, asking.exact(duration), seed, plan)
     choice = Choice(
         source=name_of(gains or default.gains or DISTANCE.option).option,
-        bandwidth=exact(bandwidth),
-        adaptation_rate=exact(adaptation_rate),
+        bandwidth=asking.exact(bandwidth),
+        adaptation_rate=asking.exact(adaptation_rate),
     )
     names = dict.fromkeys(controllers or default.controllers or ("ccm", "l1"))
     loops = [loop_of(setting, cast("Controller", name), choice) for name in names]
@@ -144,13 +131,11 @@ def simulate(
 def require_ready(system: Spec) -> None:
     """Raises `SpecError` for what is asked in vain of a specification, and without what only this needs."""
     if system.hardware is not None:
-        require_nothing_of_a_metric()
-    missing = [name for name in EXTRA if importlib.util.find_spec(name) is None]
-    if missing:
-        message = f"simulate needs {' and '.join(missing)}"
-        help = "install tubecert with its extra: pip install 'tubecert[simulate]'"
-        raise SpecError([Finding(code="TC122", message=message, help=help)])
-    of_families = [named(name) for name in ("members", "plan") if asker().given.get(name) is not None]
+        asking.require_nothing_of_a_metric()
+    asking.require_installed(EXTRA, "simulate", "simulate needs")
+    of_families = [
+        asking.named(name) for name in ("members", "plan") if asking.asker().given.get(name) is not None
+    ]
     if of_families:
         from tubecert.simulation.adaptive.reading import require_family
 

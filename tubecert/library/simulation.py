@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
+from tubecert.errors import ExitCode
 from tubecert.library.shown import Shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from matplotlib.figure import Figure
 
     from tubecert.enclosure.interval import Array
     from tubecert.library.specification import File
     from tubecert.records import Json
     from tubecert.report.page import Page
-    from tubecert.simulation.adaptive.campaign import Campaign, Outcome
+    from tubecert.simulation.adaptive.campaign import Campaign
     from tubecert.simulation.adaptive.loops import Runs
     from tubecert.simulation.sampled.campaign import Campaign as SampledCampaign
+
+_CODES: Final = {
+    "falsified": ExitCode.NOT_CERTIFIED,
+    "tube left": ExitCode.NOT_CERTIFIED,
+    "no result": ExitCode.UNDECIDED,
+    "interrupted": ExitCode.INTERRUPTED,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -29,16 +37,29 @@ class _Campaign(Shown):
     """What was simulated, and whether it falsified anything: that it did not proves nothing."""
 
     campaign: Any = field(repr=False)
+    drawn_in: ClassVar[str]  # the module of its figures
 
     @property
     def outcome(self) -> str:
-        """`not falsified`, `falsified`, `no result` or `interrupted`; also `tube left`, `nothing claimed`."""
+        """`not falsified`, `falsified`, `no result`, `interrupted`; also `tube left`, `nothing claimed`."""
+        return str(self.campaign.outcome)
+
+    @property
+    def summary(self) -> Json:
+        """Everything that was found, as plain data: what `summary.json` holds."""
         raise NotImplementedError
 
     @property
     def falsified(self) -> bool:
         """Whether a run was outside of what is proven, or a loop that adapts left the tube."""
         return self.outcome in ("falsified", "tube left")
+
+    @property
+    def _exit_code(self) -> ExitCode:
+        return _CODES.get(self.outcome, ExitCode.CERTIFIED)
+
+    def _json(self) -> str:
+        return json.dumps(self.summary, indent=1, sort_keys=True, allow_nan=False) + "\n"
 
     def figure(self, name: str = "tube_use") -> Figure:
         """A figure; draw into its axes what you like.
@@ -48,12 +69,22 @@ class _Campaign(Shown):
         """
         from tubecert.simulation.figures import drawn
 
-        found = drawn(self._drawers(), name, self.campaign)
+        found = drawn(import_module(self.drawn_in).DRAWERS, name, self.campaign)
         if found is None:
             raise KeyError(f"{name}: there is nothing that it could show")
         return found
 
-    def _drawers(self) -> Mapping[str, Callable[[Any], Figure | None]]:
+    def save(self, folder: File) -> list[str]:
+        """Write summary, runs and, of a whole campaign, figures into a folder, as the command does; their names.
+
+        Raises `TargetError`.
+        """
+        from tubecert.simulation.folder import prepared
+
+        with prepared(os.fspath(folder)):
+            return self._written(os.fspath(folder))
+
+    def _written(self, folder: str) -> list[str]:
         raise NotImplementedError
 
 
@@ -61,16 +92,12 @@ class _Campaign(Shown):
 class Simulation(_Campaign):
     """What was simulated, and whether it falsified anything: that it did not proves nothing.
 
-    `campaign` has every run; `summary` is what `summary.json` holds; `compared_with` the hash of the certificate.
+    `campaign` has every run; `compared_with` is the hash of the certificate.
     """
 
     campaign: Campaign = field(repr=False)
     compared_with: str
-
-    @property
-    def outcome(self) -> Outcome:
-        """`not falsified`, `falsified`, `tube left`, `no result`, `interrupted` or `nothing claimed`."""
-        return self.campaign.outcome
+    drawn_in = "tubecert.simulation.adaptive.figures"
 
     @property
     def summary(self) -> Json:
@@ -87,30 +114,16 @@ class Simulation(_Campaign):
 
         Raises `KeyError` for a loop that was not simulated.
         """
-        for item in self.campaign.loops:
-            if item.loop.controller == controller:
-                return item.runs
-        raise KeyError(controller)
+        return dict(zip(self.controllers, self.campaign.loops, strict=True))[controller].runs
 
     def states(self, controller: str) -> Array:
         """The states (K, n) of that run."""
         return np.asarray(self.run(controller).x[0])
 
-    def save(self, folder: File) -> list[str]:
-        """Write data, figures and the summary into a folder, as the command does; their names.
-
-        Raises `TargetError`.
-        """
+    def _written(self, folder: str) -> list[str]:
         from tubecert.simulation.adaptive.figures import write
-        from tubecert.simulation.folder import prepared
 
-        with prepared(os.fspath(folder)):
-            return write(os.fspath(folder), self.campaign, certificate=self.compared_with)
-
-    def _drawers(self) -> Mapping[str, Callable[[Campaign], Figure | None]]:
-        from tubecert.simulation.adaptive.figures import DRAWERS
-
-        return DRAWERS
+        return write(folder, self.campaign, certificate=self.compared_with)
 
     def _page(self) -> Page:
         from tubecert.report.simulation import page_of
@@ -120,17 +133,10 @@ class Simulation(_Campaign):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class SampledSimulation(_Campaign):
-    """What was simulated of a sampled loop, and whether it falsified anything: that it did not proves nothing.
-
-    `campaign` has what was seen of every run.
-    """
+    """What was simulated of a sampled loop: `campaign` has what was seen of every run."""
 
     campaign: SampledCampaign = field(repr=False)
-
-    @property
-    def outcome(self) -> str:
-        """`not falsified`, `falsified`, `no result` or `interrupted`."""
-        return self.campaign.outcome
+    drawn_in = "tubecert.simulation.sampled.figures"
 
     @property
     def runs(self) -> int:
@@ -142,19 +148,11 @@ class SampledSimulation(_Campaign):
         """Everything that was found, as plain data; there is none before the first runs are finished."""
         return self.campaign.summary
 
-    def save(self, folder: File) -> list[str]:
-        """Write summary, runs and, of a whole campaign, figures into a folder; their names. Raises `TargetError`."""
-        from tubecert.simulation.folder import prepared, written_to
+    def _written(self, folder: str) -> list[str]:
+        from tubecert.simulation.folder import written_to
         from tubecert.simulation.sampled.figures import DRAWERS, files
 
-        with prepared(os.fspath(folder)):
-            figures = [f"{name}.png" for name in DRAWERS]
-            return written_to(os.fspath(folder), self.summary, files(self.campaign), figures)
-
-    def _drawers(self) -> Mapping[str, Callable[[SampledCampaign], Figure | None]]:
-        from tubecert.simulation.sampled.figures import DRAWERS
-
-        return DRAWERS
+        return written_to(folder, self.summary, files(self.campaign), [f"{name}.png" for name in DRAWERS])
 
     def _page(self) -> Page:
         from tubecert.report.sampled_simulation import page_of

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
-from tubecert.asking import (
-    METRIC,
-    Choice,
-    Exact,
-    Number,
-    Text,
-    exact,
-    question,
-    require_nothing_of_a_metric,
-    text_of_number,
-)
-from tubecert.errors import SpecError
+from tubecert import asking
+from tubecert.asking import Number
+from tubecert.errors import ExitCode, SpecError
 from tubecert.findings import Finding
-from tubecert.library.certifying import BUDGET, DECIDING, SCHEDULER
+from tubecert.library.certifying import BUDGET, DECIDING, METRIC_NAME, SCHEDULER
 from tubecert.library.shown import Shown
 
 if TYPE_CHECKING:
@@ -35,11 +28,13 @@ if TYPE_CHECKING:
     from tubecert.report.page import Page
     from tubecert.report.quantities import Value
     from tubecert.report.sweep import Row, SweepTable
+    from tubecert.report.text import Rows
     from tubecert.spec import Setting
     from tubecert.sweep.grid import Axis
     from tubecert.sweep.run import Sweep
 
 REMEDY: Final = "the folder of a sweep must stay there while it runs"
+_PAGE: Final = "sweep.html"
 Range: TypeAlias = str | Iterable[Number]
 
 
@@ -136,22 +131,52 @@ class Swept(Shown):
 
         return page_of(self.table)
 
+    def _closing(self) -> Rows:
+        drawn = [name for name in self.files if name.startswith("figures/")]
+        others = sorted({*self.files} - {*drawn})
+        rows = [("page" if name == _PAGE else "table", str(self.folder / name)) for name in others]
+        return rows + (
+            [("figures", f"{self.folder / 'figures'}: {len(drawn)} drawings (SVG)")] if drawn else []
+        )
 
-@question({
-    "metric": Text("Metric file (JSON) in place of the specification's.", "FILE", sets="metric", of=METRIC),
-    "conditions": Choice(
+    def _json(self) -> str:
+        from tubecert.printable import printable_json
+        from tubecert.records import exact_json
+
+        cells = (
+            [exact_json(each) if isinstance(each, Fraction) else each for each in row]
+            for row in self.table.cells()
+        )
+        rows = [dict(zip(self.table.header, row, strict=True)) for row in cells]
+        return printable_json(json.dumps(rows, indent=1, ensure_ascii=False)) + "\n"
+
+    @property
+    def _exit_code(self) -> ExitCode:
+        return ExitCode.INTERNAL if self.broken else ExitCode.CERTIFIED
+
+
+@asking.question({
+    "spec": asking.SPEC,
+    "over": asking.Kind("A key and its values; may be repeated.", "KEY=RANGE", many=True),
+    "settings": asking.SETTINGS,
+    "metric": METRIC_NAME,
+    "conditions": asking.Choice(
         "Which certificate decides the verdict; all are always computed.  [conditions.decides, or A]",
         words=DECIDING,
-        of=METRIC,
+        of=asking.METRIC,
     ),
-    "gap": Exact("As for certify.", below=1, of=METRIC),
+    "gap": asking.Exact("As for certify.", below=1, of=asking.METRIC),
     "budget": BUDGET,
-    "jobs": Exact("Points certified at a time.", whole=True),
-    "scheduler": Text(SCHEDULER.help, SCHEDULER.metavar),
+    "jobs": asking.Exact("Points certified at a time.", whole=True),
+    "scheduler": asking.Text(SCHEDULER.help, SCHEDULER.metavar),
+    "deadline": asking.ENDING,
+    "folder": asking.Text(
+        "Points, table, figures.  [SPEC's stem.sweep]", "FOLDER", called="--output", short="-o", ending=".sweep"
+    ),
 })  # fmt: skip
 def sweep(
     spec: Specifiable,
-    over: Mapping[str, Range] | Iterable[str],
+    over: Mapping[str, Range] | Iterable[str] = (),
     *,
     folder: File,
     settings: Data | Sequence[Setting] = (),
@@ -163,7 +188,7 @@ def sweep(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Swept:
-    """Certify a specification with every combination of values of some keys: `tubecert sweep`.
+    """Certify every point of a grid of keys of a specification; a table, curves, heat maps.
 
     `over`: by key a range as the command takes it (`".1:.6:6"`, `"100:2000:log5"`), or values. What is in `folder` from
     an interrupted sweep that is the same is used. `settings` are as those of `load`. `metric` is a file. Points are
@@ -194,14 +219,14 @@ def sweep(
         options=Options(
             metric=None if metric is None else Path(metric),
             conditions=conditions,
-            gap=exact(gap) or usual.gap,
+            gap=asking.exact(gap) or usual.gap,
             budget=budget or usual.budget,
         ),
         folder=place if cluster is None else place.resolve(),
     )
     whole = Sweep.of(task, axes)
     if whole.first().hardware is not None:
-        require_nothing_of_a_metric()
+        asking.require_nothing_of_a_metric()
     if cluster is not None:
         _require_paths(whole)
     whole.run(cluster or chosen(jobs, len(whole.points)), timed(progress))
@@ -214,21 +239,21 @@ def _axes(over: Mapping[str, Range] | Iterable[str]) -> list[Axis]:
     """The ranges; raises `SpecError` with everything that is wrong with them."""
     from tubecert.sweep.grid import Axis
 
-    words: Any = over
+    if not over:
+        own = asking.named("over")
+        asking.refuse(
+            own, "", f"{own} says which keys have which values", f"for example {own} tube.epsilon=.1:.6:6"
+        )
+    words: Iterable[str] = over
     if isinstance(over, Mapping):
-        words = [
-            f"{key}={values if isinstance(values, str) else ','.join(text_of_number(each, key) for each in values)}"
-            for key, values in over.items()
-        ]
-    axes, findings = list[Axis](), list[Finding]()
-    for each in words:
-        try:
-            axes.append(Axis.of(each))
-        except SpecError as error:
-            findings += error.findings
-    if findings:
-        raise SpecError(findings)
-    return axes
+        words = (f"{key}={_range(key, values)}" for key, values in over.items())
+    return asking.each_of(words, Axis.of)
+
+
+def _range(key: str, values: Range) -> str:
+    if isinstance(values, str):
+        return values
+    return ",".join(asking.text_of_number(each, key) for each in values)
 
 
 def _written(folder: Path, table: SweepTable) -> tuple[str, ...]:
@@ -241,7 +266,7 @@ def _written(folder: Path, table: SweepTable) -> tuple[str, ...]:
 
     texts = {"table.csv": table.csv()}
     drawn = sweep_figures(table)
-    texts["sweep.html"] = render_page(page_of(table, drawn))
+    texts[_PAGE] = render_page(page_of(table, drawn))
     for figure in drawn:
         texts[f"figures/{figure.key.removeprefix('sweep-')}.svg"] = svg_file(figure)
     for name, text in texts.items():

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-
-from tubecert.asking import named
+from tubecert.asking import named, require_installed
 from tubecert.errors import SpecError
 from tubecert.executor import Cluster, Executor, Processes, WorkerError
 from tubecert.findings import Finding
@@ -24,10 +22,7 @@ def workers_of(jobs: int | None, scheduler: str | None) -> Executor | None:
 
 def cluster_at(address: str) -> Cluster:
     """The cluster at an address; raises `SpecError` if there is none, or if its workers could find other results."""
-    if importlib.util.find_spec("distributed") is None:
-        message = f"{named('scheduler')} needs distributed"
-        help = "install tubecert with its extra: pip install 'tubecert[cluster]'"
-        raise SpecError([Finding(code="TC122", message=message, help=help)])
+    require_installed("distributed", "cluster", f"{named('scheduler')} needs")
     cluster, own = Cluster(address), versions()
     try:
         others = cluster.versions(versions)
