@@ -10,7 +10,7 @@ not computed here, they are only shown.
 | `simulation`, `sampled_simulation`, `synthesis`, `verification`, `rechecked` | those of what else a command found |
 | `sweep`, `comparison`, `findings` | those of several certificates, and of a check |
 | `claimed`, `reach`, `gains`, `shares`, `quantities` | what they have in common: claims, sizes, gains, numbers |
-| `figures_*`, `planned`, `outline` | charts: `figures_axes` says what one is, and its SVG; `figures_file` paints and writes them |
+| `figures_*`, `planned`, `outline` | charts: `figures_axes` says what one is, `figures_file` paints and writes it |
 | `github`, `junit`, `sarif` | findings for other programs |
 | `pages` | what `explain` shows |
 | `progress` | what is being proven right now, on stderr |

@@ -30,22 +30,22 @@ def widths(result: Result) -> dict[str, float] | None:
 
 
 def level_set(result: Result) -> Array | None:
-    """For a constant W the shape (n, n) of {d(x*, x) < dbar}, dbar = sqrt(a) rho: {y: y' shape^-1 y < 1}."""
+    """For a constant W what d(x*, x) < dbar = sqrt(a) rho is: {rho y: y' shape^-1 y < 1}, shape (n, n)."""
     tube, metric, W = result.tube, result.metric, _constant(result)
     if W is None or tube is None or tube.rho_r is None or metric is None or metric.lower is None:
         return None
-    a = metric.lower.below
-    return np.asarray(a * float(tube.rho) ** 2 * W) if a > 0 else None
+    return metric.lower.below * W if metric.lower.below > 0 else None
 
 
 def tube_outline(result: Result, pair: tuple[int, int]) -> Array | None:
     """What the state stays in: points (N, 2) counterclockwise around it; None where there is no tube."""
-    if result.tube is None:
+    tube, plane = result.tube, np.ix_(pair, pair)
+    if tube is None:
         return None
     if (shape := level_set(result)) is not None:
-        return ellipse(shape[np.ix_(pair, pair)])
+        return float(tube.rho) * ellipse(shape[plane])
     names, known = result.spec.effective.system.states, widths(result)
-    ball = ellipse(_ball(result.tube, len(names))[np.ix_(pair, pair)])
+    ball = float(tube.rho) * ellipse(_ball(tube, len(names))[plane])
     return ball if known is None else _cut(ball, np.array([known[names[i]] for i in pair]))
 
 
@@ -61,13 +61,12 @@ def _cut(shape: Array, sides: Array) -> Array:
 
 
 def _ball(tube: TubeData, n: int) -> Array:
-    """The shape (n, n) of |S y| < rho: rho^2 S^-1 S^-T."""
-    radius = float(tube.rho)
+    """The shape (n, n) of |S y| < 1: S^-1 S^-T."""
     if tube.coordinates is None:
-        return np.asarray(radius**2 * np.eye(n))
+        return np.eye(n)
     rows = inverse([[Fraction(entry) for entry in row] for row in tube.coordinates])
     back = np.array([[float(entry) for entry in row] for row in rows])
-    return np.asarray(radius**2 * (back @ back.T))
+    return np.asarray(back @ back.T)
 
 
 def _constant(result: Result) -> Array | None:
