@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -38,6 +39,7 @@ from tubecert.report import html, markdown
 from tubecert.report.certificate_page import page_of
 from tubecert.report.figures_axes import Axis, _corners, _hull, number
 from tubecert.report.figures_file import painted
+from tubecert.report.outline import tube_outline
 from tubecert.spec import load, load_text
 
 ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text(encoding="utf-8")
@@ -327,6 +329,12 @@ def test_the_tube_of_a_constant_metric_is_an_ellipse_as_wide_as_its_half_widths(
             assert reach == pytest.approx(widths[name] * each, abs=0.25), "dbar sqrt(W_ii)"
     x = np.array([row[0] for row in orbit["notes"]["plan"]["samples"]["x"]])
     assert np.allclose(plan[:, 0], safe[:, 0].min() + (x - low) * unit[0], atol=0.02)
+
+
+def test_a_tube_of_any_radius_has_an_outline():
+    result = told(sealed(certificates.certified())).result
+    wide = replace(result, tube=replace(result.tube, rho=Fraction(10) ** 200))
+    assert np.abs(tube_outline(wide, (0, 1))).max() > 1e199
 
 
 def test_every_state_over_time_has_its_half_width(orbit):
