@@ -8,7 +8,7 @@ from fractions import Fraction
 from functools import partial
 from typing import Final, Literal
 
-from tubecert.claims.family import CONSTANTS, Relax, Said, Side, plain
+from tubecert.claims.family import CONSTANTS, Member, Relax, Side, plain
 from tubecert.digits import down, near, up
 from tubecert.records import Tagged
 
@@ -32,7 +32,7 @@ class HalveConstant(Relax):
         return f"halving {symbol} ({told}) would lower the least Gamma by {share:.0f} %"
 
 
-class PlanRemedy(Said, Tagged):
+class PlanRemedy(Member, Tagged):
     """What would lower the defect of a plan."""
 
     __slots__ = ()

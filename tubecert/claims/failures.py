@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from tubecert.claims.family import Claim, Member, Reason, Said, plain
+from tubecert.claims.family import Claim, Member, Reason, plain
 from tubecert.digits import near
 from tubecert.records import Tagged
 from tubecert.verdict import Verdict
 
 
-class Outcome(Said, Tagged):
+class Outcome(Member, Tagged):
     """What a route came to; all but `Proven` are why there is no metric by it."""
 
     __slots__ = ()
@@ -76,12 +76,12 @@ class Failure(Member, Tagged):
 
     __slots__ = ()
 
-    def told(self, reason: Reason) -> str:
+    def why(self, reason: Reason) -> str:
         """Why, in one sentence; `reason` is that of the claim that there is a metric."""
-        return self._told(reason)
+        return self._why(reason)
 
-    def _told(self, reason: Reason) -> str:
-        return self.said()
+    def _why(self, reason: Reason) -> str:
+        return self.told()
 
 
 def rank(reason: Reason) -> str:
@@ -95,7 +95,7 @@ class RankUnproven(Failure):
 
     tag = "rank_of_B"
 
-    def _told(self, reason: Reason) -> str:
+    def _why(self, reason: Reason) -> str:
         return rank(reason)
 
 
@@ -105,7 +105,7 @@ class UncontrollableMode(Failure):
     mode: tuple[float, float]
     limit: Fraction
 
-    def _told(self, reason: Reason) -> str:
+    def _why(self, reason: Reason) -> str:
         real, imaginary = self.mode
         pair = f" +- {near(abs(imaginary))}i" if abs(imaginary) > 1e-9 else ""
         mode = f"the linearisation at an equilibrium has the uncontrollable mode {near(real)}{pair}"
@@ -118,7 +118,7 @@ class VariableForbidden(Failure):
     variable: str
     permitted: tuple[str, ...]
 
-    def _told(self, reason: Reason) -> str:
+    def _why(self, reason: Reason) -> str:
         permitted = ", ".join(self.permitted) or "nothing"
         return f"W cannot depend on {self.variable}: C3 (the Killing condition) permits {permitted}"
 
@@ -134,7 +134,7 @@ class NotWritable(Failure):
 
     code: str
 
-    def _told(self, reason: Reason) -> str:
+    def _why(self, reason: Reason) -> str:
         from tubecert.spec.codes import title  # with YAML, which a page of words does without
 
         return f"the metric cannot be written: {title(self.code)}"
@@ -145,7 +145,7 @@ class NotProvenAsWritten(Failure):
 
     condition: Claim
 
-    def _told(self, reason: Reason) -> str:
+    def _why(self, reason: Reason) -> str:
         return f"the metric as written could not be proven: {self.condition.why(reason)}"
 
 
@@ -165,7 +165,7 @@ class NothingFound(Failure):
     degrees: tuple[int, ...]
     last: Outcome | None
 
-    def _told(self, reason: Reason) -> str:
+    def _why(self, reason: Reason) -> str:
         if not self.attempts:
             return "no metric was found"
         degrees, routes = ", ".join(map(str, self.degrees)), " and ".join(self.routes)
@@ -187,7 +187,7 @@ class NoneCertified(Failure):
     fast: Claim
     fast_verdict: Verdict
 
-    def _told(self, reason: Reason) -> str:
+    def _why(self, reason: Reason) -> str:
         slowest, fastest = near(self.slowest), near(self.fastest)
         slow = Reason(claim=self.slow, verdict=self.slow_verdict).message
         fast = Reason(claim=self.fast, verdict=self.fast_verdict).message

@@ -5,6 +5,7 @@ Each is one class: what it holds, and beside it what it says, in a sentence that
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -21,21 +22,13 @@ CONSTANTS: dict[
 ] = {}  # symbol and words of each: `bounds.constants` says what they are called
 
 
-class _Shown:
-    """A field in a sentence: a number as `near` writes it, with as many digits as the format says."""
-
-    def __init__(self, value: object) -> None:
-        self.value = value
-
-    def __format__(self, digits: str) -> str:
-        if isinstance(self.value, (float, Fraction)):
-            return near(self.value, int(digits or 6))
-        return str(self.value)
-
-
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
 class Member:
-    """Base of families: every member is a frozen record, whose sentence `says` has fields of it in braces."""
+    """Base of families: every member is a frozen record, and says one thing.
+
+    That is `says`, with fields of it in braces: a number as `near` writes it, with three digits in {field:3}; or what a
+    member makes of its fields.
+    """
 
     __slots__ = ()
     says: ClassVar[str] = ""
@@ -45,9 +38,16 @@ class Member:
         if Tagged not in cls.__bases__:
             dataclass(frozen=True, kw_only=True)(cls)
 
-    def said(self) -> str:
-        """The sentence."""
-        return self.says.format_map({name: _Shown(value) for name, value in vars(self).items()})
+    def told(self) -> str:
+        """What it says."""
+        return self._told()
+
+    def _told(self) -> str:
+        return re.sub(r"\{(\w+):?(\d*)\}", self._field, self.says)
+
+    def _field(self, found: re.Match[str]) -> str:
+        value = getattr(self, found[1])
+        return near(value, int(found[2] or 6)) if isinstance(value, (float, Fraction)) else str(value)
 
 
 class Claim(Member, Tagged):
@@ -70,35 +70,22 @@ class Claim(Member, Tagged):
         return self.name
 
     def _why(self, reason: Reason) -> str:
-        return self.said()
+        return self.told()
 
 
-class Said(Member):
-    """What is told whatever is known: the sentence, or what a member makes of its parameters."""
-
-    __slots__ = ()
-
-    def told(self) -> str:
-        """What it says."""
-        return self._told()
-
-    def _told(self) -> str:
-        return self.said()
-
-
-class Relax(Said, Tagged):
+class Relax(Member, Tagged):
     """Something that would help; it says what to do."""
 
     __slots__ = ()
 
 
-class Assumption(Said, Tagged):
+class Assumption(Member, Tagged):
     """Something that is not proven here and that the certificate rests on; it says what is assumed."""
 
     __slots__ = ()
 
 
-M = TypeVar("M", bound=Said)
+M = TypeVar("M", bound=Member)
 
 
 def plain(module: str, family: type[M], name: str, says: str) -> type[M]:

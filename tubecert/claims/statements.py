@@ -36,7 +36,7 @@ class MetricFound(Claim):
     failure: Failure
 
     def _why(self, reason: Reason) -> str:
-        return self.failure.told(reason)
+        return self.failure.why(reason)
 
 
 class MetricDefinite(Claim):

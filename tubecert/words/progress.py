@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from tubecert.digits import near
 from tubecert.letters import NAMES
@@ -12,37 +12,27 @@ from tubecert.progress import Phase, Step, Unit
 if TYPE_CHECKING:
     from tubecert.synthesis.problem import Size
 
-
-class _Words(NamedTuple):
-    """What a phase is called, what stands behind its numbers, and what to do where a command was ended in it."""
-
-    at: str
-    counted: str
-    better: str
-
-
+# of a phase: what it is called, what stands behind its numbers, and what to do where a command was ended in it
 _SAID: Final = {
-    Phase.CERTIFICATION: _Words(
-        "proving", "claims", "a wider --gap, a smaller safe set or tube, --jobs, or more time"
+    Phase.CERTIFICATION: (
+        "proving",
+        "claims",
+        "a wider --gap, a smaller safe set or tube, --jobs, or more time",
     ),
-    Phase.PLAN: _Words("planning", "claims", "a plan of your own, fewer knots, or more time"),
-    Phase.GAINS: _Words(
-        "gains of certificate", "claims", "--conditions for one certificate only, or more time"
-    ),
-    Phase.LOOP: _Words(
-        "sampled loop", "", "a nearer start, a plan or parameters in narrower ranges, or more time"
-    ),
-    Phase.SYNTHESIS: _Words(
+    Phase.PLAN: ("planning", "claims", "a plan of your own, fewer knots, or more time"),
+    Phase.GAINS: ("gains of certificate", "claims", "--conditions for one certificate only, or more time"),
+    Phase.LOOP: ("sampled loop", "", "a nearer start, a plan or parameters in narrower ranges, or more time"),
+    Phase.SYNTHESIS: (
         "looking for a metric",
         "",
         "a lower --rate, --degree 0, fewer --variables, a smaller safe set, or more time",
     ),
-    Phase.VERIFICATION: _Words("verifying", "metrics", "a smaller safe set, a wider --gap, or more time"),
-    Phase.CHECK: _Words("checking", "files", "fewer files, or --jobs"),
-    Phase.SWEEP: _Words("certifying points", "points", "the same command goes on where it ended"),
-    Phase.SIMULATION: _Words("simulating", "runs", "fewer --runs, or a shorter --duration"),
-    Phase.FIGURES: _Words("figures and data", "", "the same command once more"),
-    Phase.RECHECK: _Words("examining", "claims", "a smaller --budget tells earlier which claims are hard"),
+    Phase.VERIFICATION: ("verifying", "metrics", "a smaller safe set, a wider --gap, or more time"),
+    Phase.CHECK: ("checking", "files", "fewer files, or --jobs"),
+    Phase.SWEEP: ("certifying points", "points", "the same command goes on where it ended"),
+    Phase.SIMULATION: ("simulating", "runs", "fewer --runs, or a shorter --duration"),
+    Phase.FIGURES: ("figures and data", "", "the same command once more"),
+    Phase.RECHECK: ("examining", "claims", "a smaller --budget tells earlier which claims are hard"),
 }
 _OF_CONSTANTS: Final = (Phase.CERTIFICATION, Phase.CHECK)
 _JOINED: Final = (Phase.CERTIFICATION, Phase.GAINS)  # where the name continues the sentence
@@ -67,7 +57,7 @@ def out_of_reach(size: Size) -> str:
 
 def next_step(phase: Phase) -> str:
     """What to do where a command was ended in a phase."""
-    return _SAID[phase].better
+    return _SAID[phase][-1]
 
 
 def duration(seconds: float) -> str:
@@ -85,7 +75,7 @@ def came_to(step: Step) -> str:
 
 
 def _done(step: Step) -> str:
-    counted = _SAID[step.phase].counted
+    _, counted, _ = _SAID[step.phase]
     if not counted or (step.of is None and not step.done):
         return ""
     return f"{step.done} {counted} done" if step.of is None else f"{step.done} of {step.of} {counted} done"
@@ -101,7 +91,7 @@ def _now(step: Step) -> str:
     """What is worked on, and what its search says."""
     name = _name(step)
     joined = " " if step.phase in _JOINED else ": "
-    at = _SAID[step.phase].at
+    at, *_ = _SAID[step.phase]
     words = f"{at}{joined}{name}" if name else at
     if step.count:
         words += f", {_counted(step)}"
