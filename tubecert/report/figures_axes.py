@@ -23,7 +23,7 @@ Point: TypeAlias = tuple[float, float]
 Points: TypeAlias = Sequence[Point] | Array
 WIDTH, HEIGHT = 400, 270
 LEFT, RIGHT, TOP, BOTTOM = 68, 14, 12, 42
-_AROUND = 48  # points of an ellipse
+_AROUND = 72  # points of an ellipse
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
