@@ -34,8 +34,7 @@ from tubecert.pipeline.counting import counted
 from tubecert.pipeline.deadline import Deadline
 from tubecert.progress import Progress
 from tubecert.spec import Spec, Synthesis
-from tubecert.stages.memory import Memory
-from tubecert.stages.question import Options, Question, Stopped, overridden, time_of
+from tubecert.stages.question import Memory, Options, Question, Stopped, overridden, time_of
 from tubecert.stages.result import Stage
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.conditions.theorem import Asked
 from tubecert.enclosure.constant import round_down
 from tubecert.kinds.table import kind_of
+from tubecert.search.gains import serves
 from tubecert.search.proposers import PROPOSERS
-from tubecert.search.scan import serves
 from tubecert.stages.bounded import Enclosed, enclose, unmet
 from tubecert.stages.judged import deciding
 from tubecert.stages.question import Question

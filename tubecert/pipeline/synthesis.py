@@ -56,8 +56,7 @@ from tubecert.pipeline.unfound import (
 )
 from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.spec import Spec, Synthesis
-from tubecert.stages.memory import Memory
-from tubecert.stages.question import Options, Question
+from tubecert.stages.question import Memory, Options, Question
 from tubecert.synthesis.diagnose import uncontrollable_mode
 from tubecert.synthesis.family import FamilyError
 from tubecert.synthesis.ladder import Ladder, Request, routes

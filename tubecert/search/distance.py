@@ -20,8 +20,17 @@ from tubecert.conditions.theorem import Asked, Proposal
 from tubecert.conditions.wind import felt, is_felt, pushed, taken
 from tubecert.enclosure.constant import round_up
 from tubecert.kernel import obstacles
-from tubecert.search.gains import DIGITS, LEAST, SLACK, Gains, GainSearch
-from tubecert.search.scan import Mask, boundary, minimum_lanes, smallest
+from tubecert.search.gains import (
+    DIGITS,
+    LEAST,
+    SLACK,
+    Gains,
+    GainSearch,
+    Mask,
+    boundary,
+    minimum_lanes,
+    smallest,
+)
 
 _LOWEST, _HIGHEST = 1e-3, 1e9  # the bandwidths considered, in units of the rate
 

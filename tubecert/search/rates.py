@@ -21,8 +21,7 @@ from tubecert.conditions.rates import RateRecipe, rate_terms, theta, zetas
 from tubecert.conditions.theorem import Asked, Proposal
 from tubecert.enclosure.constant import round_up
 from tubecert.search.distance import recipes_at
-from tubecert.search.gains import DIGITS, LEAST, Gains, GainSearch
-from tubecert.search.scan import Mask, smallest
+from tubecert.search.gains import DIGITS, LEAST, Gains, GainSearch, Mask, smallest
 
 SHARE_LEFT = 0.01  # of (26b) that the pair leaves where (26b) binds
 _LOWEST = 1e-3  # the least bandwidth considered, in units of the rate

@@ -15,6 +15,7 @@ from tubecert.bounds.constants import BoundConstants
 from tubecert.bounds.suprema import Suprema
 from tubecert.bounds.wind import residual_constants, wind_constants
 from tubecert.certificate.result import ClearanceData
+from tubecert.certificate.sections import declared_uncertainty
 from tubecert.claims.advice import DeclareUncertaintyBound, RaiseBudget, ShrinkTube
 from tubecert.claims.statements import ConstantBounded, UncertaintyBound
 from tubecert.conditions.inputs import LimitedInput
@@ -106,7 +107,7 @@ def enclose(tube: TubeFound, gaps: Mapping[str, Fraction] | None = None) -> Encl
         spent=(lambda name, boxes: now.update({name: boxes})) if own else None,
     )
     suprema = fresh.with_radius(tube.rho, tube.sides)
-    declared = declared_in(tube.coordinates, question.declared_uncertainty)
+    declared = declared_in(tube.coordinates, declared_uncertainty(question.spec))
     metric = tube.lower, tube.upper
 
     def apart(names: tuple[str, ...], compute: Callable[[], T]) -> T:
@@ -252,7 +253,7 @@ def _unbounded(enclosed: Enclosed) -> Stopped | None:
 
 def _undeclared(enclosed: Enclosed) -> Stopped | None:
     """Declared bounds of h must cover the h that is given as expressions."""
-    declared = enclosed.question.declared_uncertainty
+    declared = declared_uncertainty(enclosed.question.spec)
     if not declared or enclosed.question.model.h is None:
         return None
     # what is declared is about x, whatever the coordinates of the tube

@@ -2,34 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from tubecert.bounds.compute import time_range
 from tubecert.bounds.start import InitialState, KnownStart, StartBox, StartWithin
 from tubecert.bounds.suprema import Suprema
+from tubecert.certificate.file import digest
 from tubecert.certificate.result import SynthesisData
-from tubecert.certificate.sections import declared_metric, declared_uncertainty
 from tubecert.claims.family import Claim, Reason, Relax
 from tubecert.conditions.theorem import Asked
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.enclosure.constant import Constant, Witness
+from tubecert.enclosure.constant import Witness
 from tubecert.enclosure.domain import Range
 from tubecert.executor import Executor
 from tubecert.expression.waves import frequencies
 from tubecert.findings import Finding
+from tubecert.metric.verify import Proofs
 from tubecert.model import TIME, ControlAffineModel, build, moving_parts, time_period
 from tubecert.progress import Progress
 from tubecert.records import Json
 from tubecert.spec import Spec, canonical
-from tubecert.stages.memory import Memory
 from tubecert.trajectory import Plan
 from tubecert.verdict import Verdict
 
+T = TypeVar("T")
 # sections of the specification that say nothing of the model, the plan, the start or the tube
 _APART: Final = (
     "name",
@@ -77,6 +78,31 @@ def overridden(spec: Spec, options: Options) -> Spec:
         rho_a=spec.tube.rho_a if options.rho_a is None else options.rho_a,
     )
     return replace(spec, tube=tube)
+
+
+@dataclass(slots=True)
+class Memory:
+    """What was proven before, by what was computed and from what: it cannot be taken for another proof.
+
+    `computed` counts what was not found, by name. With `most`, so many are kept: those that were computed last.
+    `proofs` of metrics are kept for whoever asks.
+    """
+
+    kept: dict[tuple[str, str], Any] = field(default_factory=dict)
+    computed: dict[str, int] = field(default_factory=dict)
+    most: int | None = None
+    proofs: Proofs = field(default_factory=Proofs)
+
+    def recall(self, name: str, depends_on: Json, compute: Callable[[], T]) -> T:
+        """The value that `compute` gives, which depends on `depends_on` (JSON data) and nothing else."""
+        key = name, digest(depends_on)
+        if key not in self.kept:
+            self.kept[key] = compute()
+            self.computed[name] = self.computed.get(name, 0) + 1
+            if self.most is not None and len(self.kept) > self.most:
+                del self.kept[next(key for key in self.kept)]
+        value: T = self.kept[key]
+        return value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,16 +167,6 @@ class Question:
     def effort(self) -> Effort:
         """The gap and the budget of every search."""
         return Effort(gap=float(self.options.gap), budget=self.options.budget, workers=self.workers)
-
-    @cached_property
-    def declared_metric(self) -> tuple[Constant, Constant] | None:
-        """(a, A) if both are declared."""
-        return declared_metric(self.spec)
-
-    @cached_property
-    def declared_uncertainty(self) -> Mapping[str, Constant]:
-        """Declared bounds of h, h_x, h_t by name."""
-        return declared_uncertainty(self.spec)
 
     def effort_of(self, name: str) -> Effort:
         """The effort for a search by name, which tells its progress."""

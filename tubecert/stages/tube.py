@@ -14,6 +14,7 @@ from tubecert.bounds.compute import Radius, least_radius
 from tubecert.bounds.constants import Witness
 from tubecert.bounds.level import Proposed, greatest_level, least_level, too_wide
 from tubecert.bounds.suprema import Suprema
+from tubecert.certificate.sections import declared_metric
 from tubecert.claims.advice import (
     DeclareMetricBound,
     EnlargeSafeSet,
@@ -188,7 +189,7 @@ def _radius(question: Question, suprema: Suprema, proposed: Proposed | None) -> 
     offset, width = question.start.offset(suprema), sum(radii(question), Fraction(0))
     if proposed is not None:
         return least_level(suprema, safe_set, offset, width, proposed)
-    return least_radius(suprema, safe_set, offset, width, question.declared_metric)
+    return least_radius(suprema, safe_set, offset, width, declared_metric(question.spec))
 
 
 def _radii(

@@ -33,6 +33,7 @@ from tubecert.expression.matrix import (
     combine,
     determinant,
     differentiate,
+    dot,
     identity,
     jacobian,
     multiply,
@@ -116,7 +117,7 @@ def _solutions(
     n, m = len(model.states), len(model.inputs)
     slopes = jacobian(functions, model.states)  # d phi_k/dx_l
     along = [
-        [_dot(slopes[k], model.columns[j]) for j in range(m)] for k in range(len(functions))
+        [dot(slopes[k], model.columns[j]) for j in range(m)] for k in range(len(functions))
     ]  # b_j(phi_k)
     flat = [
         *(e for row in along for e in row),
@@ -189,7 +190,7 @@ def _commutes(model: ControlAffineModel, field: Field, j: int) -> bool:
     column = model.columns[j]
     slopes = jacobian(field, model.states)
     return all(
-        is_zero(_dot(slopes[i], column) - _dot(model.b_x[j][i], field)) is True for i in range(len(field))
+        is_zero(dot(slopes[i], column) - dot(model.b_x[j][i], field)) is True for i in range(len(field))
     )
 
 
@@ -223,10 +224,6 @@ def _ordered(fields: list[Field], n: int) -> list[Field]:
             lead = chosen[i]
             result[i] = tuple(e / lead for e in chosen) if lead.is_constant else chosen
     return [f for f in result if f is not None]
-
-
-def _dot(a: Sequence[Expression], b: Sequence[Expression]) -> Expression:
-    return sum((x * y for x, y in zip(a, b, strict=True) if x is not ZERO and y is not ZERO), start=ZERO)
 
 
 _POINTS = 400
