@@ -41,13 +41,7 @@ def random_program(seed):
         constants.append(block.entries.constant)
         slopes.append(block.entries.slopes)
     entries = Affine(constant=np.concatenate(constants), slopes=np.concatenate(slopes))
-    G, E = rng.normal(size=(2, N)), rng.normal(size=(1, N))
-    return ConicProgram(
-        cost=cost + G.T @ np.ones(2) + E.T @ np.ones(1),
-        semidefinite=[Semidefinite(orders=orders, entries=entries)],
-        inequalities=Affine(constant=np.ones(2), slopes=G),
-        equalities=Affine(constant=np.array([0.1]), slopes=E),
-    )
+    return ConicProgram(cost=cost, semidefinite=[Semidefinite(orders=orders, entries=entries)])
 
 
 @pytest.mark.slow

@@ -71,22 +71,6 @@ def test_the_largest_eigenvalue_is_a_conic_program(solver):
     assert found.bound == pytest.approx(found.objective, abs=1e-6)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_equalities_and_inequalities_hold(solver):
-    """The nearest correlation to a given number, [[1, y0], [y0, y1]] >= 0, y1 = 1, y0 >= 0.25, least y0."""
-    block = semidefinite([[1, 0], [0, 0]], [[[0, 1], [1, 0]], [[0, 0], [0, 1]]])
-    program = ConicProgram(
-        cost=np.array([1.0, 0.0]),
-        semidefinite=[block],
-        inequalities=Affine(constant=np.array([-0.25]), slopes=np.array([[1.0, 0.0]])),
-        equalities=Affine(constant=np.array([-1.0]), slopes=np.array([[0.0, 1.0]])),
-    )
-    found = solve(program, solver)
-    assert found.values == pytest.approx([0.25, 1.0], abs=1e-6)
-    low, beside, high = block.entries.at(found.values)
-    assert np.linalg.eigvalsh([[low, beside], [beside, high]])[0] > 0.7
-
-
 @pytest.mark.parametrize("solver", [*SOLVERS, "cvxpy:CLARABEL", "cvxpy:SCS"])
 def test_infeasible_is_an_opinion_and_has_no_value(solver):
     both = [semidefinite([[-1.0]], [[[1.0]]]), semidefinite([[-1.0]], [[[-1.0]]])]

@@ -1,6 +1,6 @@
 """Semidefinite programs, straight to a conic solver.
 
-Minimise c'y subject to S_0 + sum_k y_k S_k >= 0 for every block, g_0 + G y >= 0 and e_0 + E y = 0. All slopes are
+Minimise c'y subject to S_0 + sum_k y_k S_k >= 0 for every block. All slopes are
 sparse and nothing is canonicalised, so that the wall time is the solver's own. Clarabel runs on one thread with fixed
 settings; SCS, for cross-checks, and every other solver are reached through cvxpy.
 Untrusted: what comes back is a proposal with an opinion, never a verdict.
@@ -54,12 +54,10 @@ class Semidefinite:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConicProgram:
-    """Minimise cost'y (N,) subject to `semidefinite` blocks, `inequalities` >= 0 and `equalities` = 0."""
+    """Minimise cost'y (N,) subject to `semidefinite` blocks."""
 
     cost: Array
-    semidefinite: Sequence[Semidefinite] = ()
-    inequalities: Affine | None = None
-    equalities: Affine | None = None
+    semidefinite: Sequence[Semidefinite]
 
     @property
     def orders(self) -> list[int]:
@@ -123,10 +121,9 @@ def solve(
 
 
 def _stacked(program: ConicProgram) -> Affine:
-    """All rows as one: equalities, inequalities, blocks with off-diagonal entries times sqrt 2."""
-    parts = [part for part in (program.equalities, program.inequalities) if part is not None]
-    scale = np.concatenate([np.ones(sum(map(_rows, parts))), *map(_scale, program.orders)])
-    parts += [block.entries for block in program.semidefinite]
+    """All rows as one, off-diagonal entries times sqrt 2."""
+    parts = [block.entries for block in program.semidefinite]
+    scale = np.concatenate([_scale(order) for order in program.orders])
     slopes = sparse.vstack([sparse.csr_array(part.slopes) for part in parts], format="csc")
     assert slopes.shape == (len(scale), len(program.cost)), (
         "a row for every entry, a column for every variable"
@@ -143,10 +140,6 @@ def _scale(order: int) -> Array:
     return np.where(i == j, 1.0, np.sqrt(2.0))
 
 
-def _rows(part: Affine | None) -> int:
-    return 0 if part is None else len(part.constant)
-
-
 def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations: int) -> ConicSolution:
     import clarabel
 
@@ -157,12 +150,7 @@ def _clarabel(program: ConicProgram, rows: Affine, tolerance: float, iterations:
     settings.chordal_decomposition_enable = False
     settings.max_iter = iterations
     settings.tol_feas = settings.tol_gap_abs = settings.tol_gap_rel = tolerance
-    cones: list[Any] = []
-    if _rows(program.equalities):
-        cones.append(clarabel.ZeroConeT(_rows(program.equalities)))
-    if _rows(program.inequalities):
-        cones.append(clarabel.NonnegativeConeT(_rows(program.inequalities)))
-    cones += [clarabel.PSDTriangleConeT(order) for order in program.orders]
+    cones = [clarabel.PSDTriangleConeT(order) for order in program.orders]
     width = len(program.cost)
     quadratic = sparse.csc_matrix((width, width))
     try:
@@ -252,7 +240,7 @@ def solve_through_cvxpy(
     cvxpy = _cvxpy()
     y = cvxpy.Variable(len(program.cost))
     parts = list(_parts(program))
-    constraints = [_constraint(kind, part, y) for kind, part in parts]
+    constraints = [_constraint(part, y) for part in parts]
     task = cvxpy.Problem(cvxpy.Minimize(program.cost @ y), constraints)
     try:
         with warnings.catch_warnings():
@@ -264,17 +252,13 @@ def solve_through_cvxpy(
     return _answer(task, y, name, _bound(parts, constraints), tolerance)
 
 
-def _parts(program: ConicProgram) -> Iterator[tuple[str, Affine]]:
-    """Equalities, inequalities, and every matrix with all its entries, row by row."""
-    if program.equalities is not None and len(program.equalities.constant):
-        yield "zero", program.equalities
-    if program.inequalities is not None and len(program.inequalities.constant):
-        yield "nonnegative", program.inequalities
+def _parts(program: ConicProgram) -> Iterator[Affine]:
+    """Every matrix with all its entries, row by row."""
     for block in program.semidefinite:
         slopes, start = sparse.csr_array(block.entries.slopes), 0
         for order in block.orders:
             rows = start + _places(order)
-            yield "semidefinite", Affine(constant=block.entries.constant[rows], slopes=slopes[rows])
+            yield Affine(constant=block.entries.constant[rows], slopes=slopes[rows])
             start += order * (order + 1) // 2
 
 
@@ -286,15 +270,9 @@ def _places(order: int) -> Any:
     return places.ravel()
 
 
-def _constraint(kind: str, part: Affine, y: Any) -> Any:
-    cvxpy = _cvxpy()
-    value = part.slopes @ y + part.constant
-    if kind == "zero":
-        return value == 0
-    if kind == "nonnegative":
-        return value >= 0
+def _constraint(part: Affine, y: Any) -> Any:
     order = round(np.sqrt(len(part.constant)))
-    return cvxpy.reshape(value, (order, order), order="C") >> 0
+    return _cvxpy().reshape(part.slopes @ y + part.constant, (order, order), order="C") >> 0
 
 
 def _settings(name: str, tolerance: float, iterations: int | None) -> dict[str, float]:
@@ -309,14 +287,13 @@ def _settings(name: str, tolerance: float, iterations: int | None) -> dict[str, 
     return {}
 
 
-def _bound(parts: list[tuple[str, Affine]], constraints: list[Any]) -> float | None:
+def _bound(parts: list[Affine], constraints: list[Any]) -> float | None:
     """The dual's value: of the Lagrangian, what does not depend on y. None without multipliers."""
     total = 0.0
-    for (kind, part), constraint in zip(parts, constraints, strict=True):
+    for part, constraint in zip(parts, constraints, strict=True):
         if constraint.dual_value is None:
             return None
-        value = float(part.constant @ np.ravel(np.asarray(constraint.dual_value, dtype=float)))
-        total += value if kind == "zero" else -value
+        total -= float(part.constant @ np.ravel(np.asarray(constraint.dual_value, dtype=float)))
     return total
 
 
