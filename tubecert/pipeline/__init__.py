@@ -21,20 +21,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tubecert.certificate.result import Result
-from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.errors import SpecError
 from tubecert.executor import Executor
-from tubecert.findings import Severity
 from tubecert.letters import ALONE
 from tubecert.metric.verify import Proofs
-from tubecert.model import domain_findings
 from tubecert.pipeline.certification import answer, result
-from tubecert.pipeline.checks import inspect, missing_parts, missing_sections, unsearchable
+from tubecert.pipeline.checks import inspect, missing_parts, missing_sections, sound_time, unsearchable
 from tubecert.pipeline.counting import counted
 from tubecert.pipeline.deadline import Deadline
 from tubecert.progress import Progress
 from tubecert.spec import Spec, Synthesis
-from tubecert.stages.question import Memory, Options, Question, Stopped, overridden, time_of
+from tubecert.stages.question import Memory, Options, Question, Stopped, overridden
 from tubecert.stages.result import Stage
 
 if TYPE_CHECKING:
@@ -101,16 +97,10 @@ def question_of(
 ) -> Question:
     """The question that options make of a specification; raises `SpecError` if it is meaningless."""
     spec = overridden(spec, options)
-    findings, time = time_of(spec)
-    findings += missing_parts(spec)
-    if not findings:
-        findings = domain_findings(spec, time, Effort(budget=options.budget))
-    if any(item.severity is Severity.ERROR for item in findings):
-        raise SpecError(findings)
     return Question(
         spec=spec,
         options=options,
-        time=time,
+        time=sound_time(spec, options, missing_parts),
         progress=progress,
         memory=Memory() if memory is None else memory,
     )
@@ -141,11 +131,7 @@ def synthesise(
 
     required(wanted.solver)
     spec = replace(overridden(spec, options), metric=None, synthesis=None)
-    findings, time = time_of(spec)
-    findings += [*unsearchable(spec), *missing_sections(spec, wanted)]
-    findings += domain_findings(spec, time, Effort(budget=options.budget)) if not findings else []
-    if any(item.severity is Severity.ERROR for item in findings):
-        raise SpecError(findings)
+    sound_time(spec, options, lambda own: [*unsearchable(own), *missing_sections(own, wanted)])
     run = SynthesisRun(
         spec,
         wanted,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.domain import Range
+from tubecert.errors import SpecError
 from tubecert.findings import Finding, Location, Severity
 from tubecert.lint import lint, name_findings
 from tubecert.model import build, domain_findings, place, rank_decision
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.load import NO_SEARCH
 from tubecert.spec.metric_file import of_no_metric
-from tubecert.stages.question import time_of
+from tubecert.stages.question import Options, time_of
 from tubecert.trajectory.make import unending
 from tubecert.verdict import Verdict
 
@@ -46,6 +49,16 @@ def _rank_findings(spec: Spec, effort: Effort) -> list[Finding]:
             help="shrink the safe set, or remove an input that does nothing there",
         )
     ]
+
+
+def sound_time(spec: Spec, options: Options, lacking: Callable[[Spec], Iterable[Finding]]) -> Range | None:
+    """The range of time that matters; raises `SpecError` for what makes the question meaningless, or is lacking."""
+    findings, time = time_of(spec)
+    findings += lacking(spec)
+    findings = findings or domain_findings(spec, time, Effort(budget=options.budget))
+    if any(item.severity is Severity.ERROR for item in findings):
+        raise SpecError(findings)
+    return time
 
 
 def missing_parts(spec: Spec) -> list[Finding]:
