@@ -14,7 +14,6 @@ ELSEWHERE = {  # where a format with significant digits stands, and what it make
     "planner/propose.py": "decimals of a proposal",
     "recheck/": "words of its own, shared with nobody",
     "report/comparison.py": "signed differences in percent",
-    "report/figures_axes.py": "coordinates of SVG",
     "sweep/grid.py": "decimals of a grid",
     "synthesis/": "decimals of a proposal",
 }
