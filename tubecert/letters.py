@@ -8,18 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-__all__ = [
-    "ADAPTIVE",
-    "ALL",
-    "ALONE",
-    "DISTANCE",
-    "NAMES",
-    "RATES",
-    "Name",
-    "name_of",
-    "words_of",
-]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Name:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isfinite
+from operator import gt, lt
 
 from tubecert.claims.advice import DeclareMetricBound, LowerRate, OtherMetric, RaiseBudget
-from tubecert.claims.family import Relax
+from tubecert.claims.family import Relax, Side
 from tubecert.claims.statements import MetricBound, MetricContraction, MetricKilling, RankOfB
 from tubecert.enclosure.constant import Constant, Witness
 from tubecert.metric.verify import MetricProof
@@ -78,24 +79,21 @@ def _declared(question: Question, proof: MetricProof, least: Constant, most: Con
     metric = question.spec.metric
     if metric is None:
         raise ValueError("there is no metric")
-    if metric.lower is not None and Fraction(least.below) < metric.lower:
-        return stopped(
-            question,
-            MetricBound(side="lower", declared=metric.lower, reaches=finite(least.above)),
-            Verdict.REFUTED if Fraction(least.above) < metric.lower else Verdict.UNDECIDED,
-            where=least.at,
-            relax=(DeclareMetricBound(side="lower", value=finite(least.below)),),
-            partial=proof,
-        )
-    if metric.upper is not None and Fraction(most.above) > metric.upper:
-        return stopped(
-            question,
-            MetricBound(side="upper", declared=metric.upper, reaches=finite(most.below)),
-            Verdict.REFUTED if Fraction(most.below) > metric.upper else Verdict.UNDECIDED,
-            where=most.at,
-            relax=(DeclareMetricBound(side="upper", value=finite(most.above)),),
-            partial=proof,
-        )
+    sides: tuple[tuple[Side, Fraction | None, Constant, float, float], ...] = (
+        ("lower", metric.lower, least, least.below, least.above),
+        ("upper", metric.upper, most, most.above, most.below),
+    )
+    for side, declared, value, proven, reaches in sides:
+        beyond = lt if side == "lower" else gt
+        if declared is not None and beyond(proven, declared):
+            return stopped(
+                question,
+                MetricBound(side=side, declared=declared, reaches=finite(reaches)),
+                Verdict.REFUTED if beyond(reaches, declared) else Verdict.UNDECIDED,
+                where=value.at,
+                relax=(DeclareMetricBound(side=side, value=finite(proven)),),
+                partial=proof,
+            )
     return None
 
 
