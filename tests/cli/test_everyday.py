@@ -14,7 +14,7 @@ import tubecert
 from tubecert.bounds.constants import EVERY
 from tubecert.cli.app import app
 from tubecert.cli.init import TEMPLATES
-from tubecert.cli.schema import SCHEMAS
+from tubecert.cli.texts import SCHEMAS
 from tubecert.report import pages
 
 PACKAGE = Path(tubecert.__file__).parent

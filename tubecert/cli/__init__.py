@@ -9,7 +9,7 @@ Until a command runs, nothing but typer and the error family is imported: `--hel
 | `telling` | what a command tells by then, and shows at the end; which files it must not overwrite |
 | `app`, `adapter` | questions and their words as commands; the options that all share |
 | `guard` | every way a command can end -> one exit code and no traceback |
-| `certify`, `check`, ... | a module for each command |
+| `certify`, `check`, ... | commands that do more than show what the library gives |
 """
 
 import sys

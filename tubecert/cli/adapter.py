@@ -154,8 +154,9 @@ def command(
 
 def command_of(name: str) -> Command:
     """The command of a name: of its module, else what the library gives, shown."""
-    if find_spec(f"tubecert.cli.{name}") is not None:
-        found: Command = getattr(import_module(f"tubecert.cli.{name}"), name)
+    module = f"tubecert.cli.{said().commands[name].get('module', name)}"
+    if find_spec(module) is not None:
+        found: Command = getattr(import_module(module), name)
         return found
     function = getattr(import_module("tubecert"), name)
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import shlex
+from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
 from tubecert.asking import Choice, Flag, Text, refuse
 from tubecert.cli.adapter import Output, command
 from tubecert.errors import TargetError
+from tubecert.printable import visible
 
 _BESIDE: Final = {"csv": ("plan.csv",)}  # files that a template needs beside it
 TEMPLATES: Final = (
@@ -34,43 +37,31 @@ def init(
     from tubecert import certificate
     from tubecert.cli.guard import write_stdout
     from tubecert.cli.telling import refused
-    from tubecert.printable import visible
 
     if file is not None and output is not None:
         refuse("--output", "", f"FILE and --output name the same: give {file} or {output}")
     if file in TEMPLATES:
         refuse("FILE", "", f"{file} is a template: write --template {file}")
     target = output if file is None else file
-    if target is not None and target != certificate.STDOUT and not Path(target).suffix:
-        raise refused(f"{target} has no suffix", f"write tubecert init {target}.yaml")
-    text = _text(f"{template}.yaml")
     if target == certificate.STDOUT:
-        write_stdout(text)
+        write_stdout(_text(f"{template}.yaml"))
         return
+    if target is not None and not Path(target).suffix:
+        raise refused(f"{target} has no suffix", f"write tubecert init {target}.yaml")
     name = target or f"{template}.yaml"
-    text = text.replace(f"tubecert certify {template}.yaml", _command(name))
+    line = f"tubecert certify {visible(shlex.quote(name))}"
+    text = _text(f"{template}.yaml").replace(f"tubecert certify {template}.yaml", line)
     beside = {str(Path(name).with_name(each)): _text(each) for each in _BESIDE.get(template, ())}
-    for each in beside:
-        if Path(each).exists():
-            raise _refused(f"{each} exists and is not overwritten")
+    if there := [each for each in beside if Path(each).exists()]:
+        raise _refused(f"{there[0]} exists and is not overwritten")
     for each, content in {name: text, **beside}.items():
         _create(each, content)
     if not quiet:
-        write_stdout(f"{visible(name)}: a specification that certifies as it is\n  {_command(name)}\n")
+        write_stdout(f"{visible(name)}: a specification that certifies as it is\n  {line}\n")
 
 
 def _text(file: str) -> str:
-    from importlib import resources
-
-    return (resources.files("tubecert") / "templates" / file).read_text(encoding="utf-8")
-
-
-def _command(name: str) -> str:
-    import shlex
-
-    from tubecert.printable import visible
-
-    return f"tubecert certify {visible(shlex.quote(name))}"
+    return (files("tubecert") / "templates" / file).read_text(encoding="utf-8")
 
 
 def _create(name: str, text: str) -> None:

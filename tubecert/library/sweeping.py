@@ -40,7 +40,7 @@ Range: TypeAlias = str | Iterable[Number]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweptPoint:
-    """One point: the texts of the swept keys, the verdict (or `error`), what failed, and every number that it has."""
+    """One point: the texts of the swept keys, the verdict (or `error`), and every number that it has."""
 
     row: Row = field(repr=False)
     folder: Path = field(repr=False)
@@ -54,11 +54,6 @@ class SweptPoint:
     def verdict(self) -> str:
         """`certified`, `refuted`, `undecided`, or `error` where the specification is not valid."""
         return self.row.verdict
-
-    @property
-    def failed(self) -> str:
-        """The ids of what is not proven, or the codes of an error."""
-        return self.row.failed
 
     @property
     def quantities(self) -> Mapping[str, Value]:
@@ -117,11 +112,6 @@ class Swept(Shown):
         return array([float("nan") if number is None else number for number in found])
 
     @property
-    def broken(self) -> bool:
-        """Whether tubecert has a defect at a point."""
-        return any(row.broken for row in self.table.rows)
-
-    @property
     def csv(self) -> str:
         """The table as comma-separated values."""
         return self.table.csv()
@@ -152,7 +142,8 @@ class Swept(Shown):
 
     @property
     def _exit_code(self) -> ExitCode:
-        return ExitCode.INTERNAL if self.broken else ExitCode.CERTIFIED
+        broken = any(row.broken for row in self.table.rows)  # tubecert has a defect there
+        return ExitCode.INTERNAL if broken else ExitCode.CERTIFIED
 
 
 @asking.question({

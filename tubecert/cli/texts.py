@@ -1,15 +1,28 @@
-"""`explain`: one page about a word of a report, a finding code, a constant or an equation."""
+"""`schema`, `explain`, `version`: texts of tubecert's own, about itself."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from typing import Final
 
-from tubecert.asking import Text
+from tubecert.asking import Choice, Text
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.errors import SpecError
 
-_TOPIC = Text("A code, a constant or an equation.", "TOPIC", place=True, optional=True)
+SCHEMAS: Final = ("spec", "metric", "certificate", "sampled-loop")
+_NAME: Final = Choice("Of what.", "|".join(SCHEMAS), words=SCHEMAS, place=True, optional=True)
+_TOPIC: Final = Text("A code, a constant or an equation.", "TOPIC", place=True, optional=True)
+
+
+@command({"name": _NAME}, shared=("debug",))
+def schema(how: Output, name: str = "spec") -> None:
+    """Show a JSON Schema: of specifications (for editors), of metric files, of certificates, of those with hardware."""
+    from importlib import resources
+
+    file = resources.files("tubecert") / "schemas" / f"{name}.schema.json"
+    write_stdout(file.read_text(encoding="utf-8"))
 
 
 @command({"topic": _TOPIC}, shared=("debug",))
@@ -41,3 +54,16 @@ def _index() -> Iterator[str]:
     yield from (f"  {name:<20} {page.symbol:<14} {page.title}" for name, page in pages.constants().items())
     yield "\nEquations"
     yield from (f"  {tag:<20} {page.title}" for tag, page in pages.equations().items())
+
+
+@command({})
+def version(how: Output) -> None:
+    """Show the version; with -v, also those of Python and of the libraries that results rest on."""
+    from tubecert.libraries import versions
+    from tubecert.release import __version__
+
+    shown = versions() if how.verbose or how.json else {"tubecert": __version__}
+    if how.json:
+        write_stdout(json.dumps(shown, indent=1) + "\n")
+    else:
+        write_stdout("".join(f"{name} {own}\n" for name, own in shown.items()))
