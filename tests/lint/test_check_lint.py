@@ -10,6 +10,7 @@ from texts import replaced
 
 import tubecert
 from tubecert import lint, pipeline
+from tubecert.digits import near
 from tubecert.findings import Finding, Severity
 from tubecert.spec import canonical, load, load_text
 
@@ -93,6 +94,9 @@ CASES = {
     "an unknown gain": ("TC416", "6:15", [("{k: 2}", "{k: 2, m: [1, 2]}"), ("[1]]", "[1/m]]")]),
     "an output wished for": ("TC416", "15:33", [(FROM_METRIC, WISHES), ("  f: [", "  outputs: {s: p - v}\n  f: [")]),
     "a point that moves": ("TC404", "12:52", [(FROM_METRIC, MACHINE), ("input: [0]", "input: [1]")]),
+    "held automatically": ("TC417", "12:37", [("at: [0, 0], input: [0]", "at: auto, near: [0.1, 0]")]),
+    "a start beyond a wish": ("TC405", "13:16", [(FROM_METRIC, WISHES.replace(", s", ", v")), (START, ALONG)]),
+    "a start without room": ("TC405", "13:16", [(FROM_METRIC, MACHINE), ("{at: [0, 0]}", "{within: 1.2}")]),
     "far obstacle": ("TC409", "19:5", [(TUBE, TUBE + "\nobstacles:\n  - disc: {center: [9, 0], radius: 0.2}")]),
 }  # fmt: skip
 
@@ -218,6 +222,13 @@ def test_a_unit_of_time_that_is_no_second_is_told():
     [note] = found(changed(("  states: [p, v]", "  units: {p: m, v: m/min, u: N}\n  states: [p, v]")))
     assert (note.code, note.severity, str(note.location)[-4:]) == ("TC132", Severity.NOTE, "4:20")
     assert "the time of this file is in min" in note.message
+    [warning] = found(
+        changed(
+            ("  states: [p, v]", "  units: {p: m, v: m/min, u: N}\n  states: [p, v]"), (FROM_METRIC, MACHINE)
+        )
+    )
+    assert warning.severity is Severity.WARNING  # a rate of 500 is meant in Hz
+    assert "samples per min" in warning.help
     for v in ("m/s", "1/min"):
         assert not found(changed(("  states: [p, v]", f"  units: {{p: m, v: {v}, u: N}}\n  states: [p, v]")))
 
@@ -306,6 +317,9 @@ def test_at_auto_is_the_equilibrium_near_a_point_in_exact_numbers():
     assert canonical(load_text(TANKS.replace("at: [3.18, 4.96], input: [0.892]", written))) == canonical(
         load_text(auto)
     )
+    [note] = [item for item in found(auto) if item.code == "TC417"]
+    moved = f"which moves a by {near(float(a) - 3.18, 2)}, b by {near(float(b) - 4.96, 2)} from near"
+    assert (note.severity, note.message.partition(", ")[2][-len(moved) :]) == (Severity.NOTE, moved)
     middle = canonical(load_text(TANKS.replace("at: [3.18, 4.96], input: [0.892]", "at: auto")))
     assert abs(Fraction(middle["trajectory"]["at"][0]) - 3) < Fraction("0.3")
     arm = BASE.replace('"-k*p - v"', '"19.62*sin(p)"').replace(
@@ -316,6 +330,12 @@ def test_at_auto_is_the_equilibrium_near_a_point_in_exact_numbers():
     ).trajectory  # by its input: no state moves
     assert [term.expression.fraction for term in held.x] == [Fraction(1, 10), 0]
     assert abs(float(held.u[0].expression.fraction) + 19.62 * math.sin(0.1)) < 1e-15
+
+
+def test_a_machine_needs_no_rank():
+    lost = ("[[0], [1]]", "[[0], [p]]")
+    assert "TC203" in [item.code for item in found(changed(lost))]
+    assert "TC203" not in [item.code for item in found(changed(lost, (FROM_METRIC, MACHINE)))]
 
 
 CAR = """

@@ -53,6 +53,7 @@ def certify(
     from tubecert.cli.telling import spare
     from tubecert.library.specification import Specification
     from tubecert.library.stated import page_of
+    from tubecert.lint.plan import held
     from tubecert.spec import load
 
     metric = asked.get("metric")
@@ -73,10 +74,11 @@ def certify(
         found.save(output)
     new = _kept_metric(found, kept)
     write_pages(report, found.certificate)
+    told = [("plan", item.message) for item in held(system)]
     written = [("certificate", output), *(("page", page) for page in report), *_next(found, system, output)]
     page = page_of(found.certificate, all_of_it=how.verbose)
     data = found.text if how.json or output == certificate.STDOUT else None
-    telling.present(how, page, [("metric", new), *written] if new else written, data)
+    telling.present(how, page, [*told, *([("metric", new)] if new else []), *written], data)
     return found.verdict.exit_code
 
 

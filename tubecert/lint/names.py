@@ -166,11 +166,14 @@ def _unit_of_time(spec: Spec) -> Iterator[Finding]:
         found = _PER_TIME.fullmatch(units.get(rate, ""))
         if found and found[1] == units.get(name):
             message = f"f has {name}' = {rate}, in {units[rate]}: the time of this file is in {found[2]}"
+            beside, severity = "", Severity.NOTE
+            if spec.hardware is not None:
+                beside, severity = f", hardware counts samples per {found[2]}", Severity.WARNING
             help = (
-                f"nothing is converted: horizons are in {found[2]} and rates in 1/{found[2]} then, whatever a "
+                f"nothing is converted: horizons are in {found[2]} and rates in 1/{found[2]} then{beside}, whatever a "
                 "report calls them; or write the dynamics in seconds"
             )
-            yield finding(spec, codes.UNITS, f"system.units.{rate}", message, help, severity=Severity.NOTE)
+            yield finding(spec, codes.UNITS, f"system.units.{rate}", message, help, severity=severity)
             return
 
 

@@ -44,9 +44,10 @@ class Curve:
 def plan_findings(spec: Spec) -> list[Finding]:
     """Findings about the plan, the start and the obstacles."""
     curve = curve_of(spec)
-    findings = [*_start(spec)]
-    outside = list(_outside(spec, curve))
-    findings += outside or room_findings(spec, curve.t, curve.x)
+    start, outside = list(_start(spec)), list(_outside(spec, curve))
+    findings = [*held(spec), *start, *outside]
+    if not outside and not (start and spec.hardware):
+        findings += room_findings(spec, curve.t, curve.x)
     findings += _beyond_limits(spec, curve)
     if not outside and spec.trajectory.written:
         findings += _defect(spec, curve, build(spec))
@@ -83,6 +84,21 @@ def curve_of(spec: Spec) -> Curve:
     both = tape.run_floats([t], t.shape).T
     n = len(spec.states)
     return Curve(t=t, x=both[:, :n], u=both[:, n:], path="trajectory.at" if count == 1 else "trajectory.x")
+
+
+def held(spec: Spec) -> Iterator[Finding]:
+    """What at: auto stands for, and how far that is from the point near which it is."""
+    plan = spec.trajectory
+    if not plan.about:
+        return
+    x, u = ([term.expression.fraction for term in terms] for terms in (plan.x, plan.u))
+    point, inputs = (f"[{', '.join(near(float(own), 4) for own in each)}]" for each in (x, u))
+    pairs = zip(spec.states, x, plan.about, strict=True)
+    moved = [f"{name} by {near(float(own - at), 2)}" for name, own, at in pairs if own != at]
+    given = "near" if "trajectory.near" in spec.locations else "the middle of the safe set"
+    apart = f", which moves {', '.join(moved)} from {given}" if moved else f", which is {given}"
+    message, help = f"at: auto holds {point} with input {inputs}{apart}", "they are kept to 20 digits"
+    yield finding(spec, codes.HELD, "trajectory.at", message, help, severity=Severity.NOTE)
 
 
 def _excess(spec: Spec, points: Array) -> tuple[int, int, float]:

@@ -37,9 +37,14 @@ def least_radius(spec: Spec) -> float:
 
 def room_findings(spec: Spec, t: Array, x: Array) -> Iterator[Finding]:
     """A tube that leaves the safe set around the plan `x` (K, n) at times `t` (K,), or that the start is not in."""
-    if spec.hardware is not None:  # the tube is what is found
-        return
     offset = _offset(spec, x)
+    if (
+        spec.hardware is not None
+    ):  # the tube is what is found: within wishes and the safe set, with the start in it
+        sides, most = np.abs(offset) + float(spec.within or 0), _most(spec, x)
+        if (sides > most * (1 + _ROUNDING)).any():
+            yield _outside(spec, sides, most)
+        return
     if not spec.tube.auto:
         rho = least_radius(spec) + float(np.linalg.norm(offset))
         yield from _too_wide(spec, t, x, np.full(len(spec.states), rho), f"{_BALL} {near(rho, 4)}")
@@ -60,6 +65,14 @@ def room_findings(spec: Spec, t: Array, x: Array) -> Iterator[Finding]:
         yield from _too_wide(spec, t, x, np.where(asked > 0, level * widths, 0.0), "")
 
 
+def _most(spec: Spec, x: Array) -> Array:
+    """The widest tube of a machine that there can be at the start of a plan `x` (K, n), or of any of a family."""
+    low, high = np.array(spec.safe_set, dtype=float).T
+    starts = x if spec.trajectory.bundle else x[:1]
+    wished = [float(dict(spec.tube.half_widths).get(name, math.inf)) for name in spec.states]
+    return np.asarray(np.clip(np.minimum(starts - low, high - starts).min(axis=0), 1e-300, wished))
+
+
 def _too_wide(spec: Spec, t: Array, x: Array, sides: Array, radius: str) -> Iterator[Finding]:
     """Where the tube leaves the safe set by most, against its own width there."""
     low, high = np.array(spec.safe_set, dtype=float).T
@@ -76,9 +89,9 @@ def _too_wide(spec: Spec, t: Array, x: Array, sides: Array, radius: str) -> Iter
         else f"the tube reaches {name}* +-{near(side, 4)}"
     )
     message = f"{reaches}, but{when} the plan is only {near(room, 4)} from the {name} side of the safe set"
-    fits = f"half_widths.{name} of at most {near(room, 4)} fits; or enlarge the safe set"
+    help = f"half_widths.{name} of at most {near(room, 4)} fits; or enlarge the safe set" if asked else _LESS
     path = (asked or "tube") if spec.location(asked or "tube") else "safe_set"
-    yield finding(spec, codes.NO_ROOM, path, message, fits if asked else _LESS, severity=Severity.ERROR)
+    yield finding(spec, codes.NO_ROOM, path, message, help, severity=Severity.ERROR)
 
 
 def _outside(spec: Spec, offset: Array, sides: Array) -> Finding:
@@ -91,7 +104,8 @@ def _outside(spec: Spec, offset: Array, sides: Array) -> Finding:
         else " in a direction in which the tube is thin"
     )
     message = f"the initial state is outside of the tube: {name} is {near(off, 4)} from the plan's{beyond}"
-    help = "start nearer to the plan, or ask for larger half-widths"
+    larger = "half-widths" if spec.hardware is None else "half-widths, or enlarge the safe set"
+    help = f"start nearer to the plan, or ask for larger {larger}"
     path = "initial_state" if spec.location("initial_state") else "trajectory"
     return finding(spec, codes.START_OUTSIDE, path, message, help, severity=Severity.ERROR)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, ClassVar, Final, Literal, get_args
 
@@ -187,6 +187,7 @@ class Trajectory:
     task: Task | None = None
     bundle: Bundle | None = None
     afterwards: Afterwards = "nothing"
+    about: Vector = field(default=(), compare=False)  # with at: auto, the point near which x is looked for
 
     def __post_init__(self) -> None:
         assert self.horizon is not None or self.afterwards == "nothing"
@@ -325,16 +326,16 @@ def _trimmed(
     if plant is None:
         return None
     middle = tuple((low + high) / 2 for low, high in plant.box)
-    u = [term.expression.fraction for term in values.get("u", ())]
-    found = equilibrium(plant, values.get("near", middle), tuple(u or [Fraction(0)] * len(plant.inputs)))
+    given = [term.expression.fraction for term in values.get("u", ())]
+    about = values.get("near", middle)
+    found = equilibrium(plant, about, tuple(given or [Fraction(0)] * len(plant.inputs)))
     if found is None:
         help = "give near: [...], a point beside one, or at and input with f(at) + B(at) input = 0"
         moving = TIME in free_symbols(term.expression for term in plant.f)
         where = "of an f that depends on t" if moving else "there in the safe set"
         return at.fail(codes.RANGE, f"no equilibrium is found {where}", help)
-    return {
-        key: tuple(keys.constant_term(at, own) for own in each) for key, each in zip("xu", found, strict=True)
-    }
+    x, u = (tuple(keys.constant_term(at, own) for own in each) for each in found)
+    return {"x": x, "u": u, "about": about}
 
 
 def _made(kind: PlanKind, values: dict[str, Any], field: Field, names: Names) -> Trajectory:
@@ -342,7 +343,7 @@ def _made(kind: PlanKind, values: dict[str, Any], field: Field, names: Names) ->
     match kind:
         case "equilibrium":
             none = tuple(keys.constant_term(field, Fraction(0)) for _ in names.inputs)
-            values = {"x": values["x"], "u": values.get("u", none)}
+            values = {"x": values["x"], "u": values.get("u", none), "about": values.get("about", ())}
         case "csv":
             values = {"table": values["table"]}
         case "ilqr":
