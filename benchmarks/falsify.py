@@ -77,7 +77,7 @@ def _notes(attack: Attack) -> str:
 
 
 def _words(loop: Loop) -> str:
-    gains = loop.problem.gains
+    gains = loop.gains
     assert gains is not None
     chosen = "B" if loop.promise else "chosen"
     return f"{loop.controller}, omega {gains.bandwidth:.4g}, Gamma {gains.adaptation_rate:.4g}, {chosen}"

@@ -268,7 +268,7 @@ def test_simulations_stay_within_what_is_certified(tube):
     setting = setting_of(spec, result)
     for source in ("26", "distance"):
         loop = loop_of(setting, "l1", Choice(source=source))
-        (runs,) = integrate([cases(setting, 0, range(6)).of(loop.problem)], tolerance=setting.tolerance)
+        (runs,) = integrate([cases(setting, 0, range(6)).of(loop)], tolerance=setting.tolerance)
         found = compare(setting, runs, loop.promise)
         assert not found.violations
         assert not found.left_the_tube
@@ -281,7 +281,7 @@ def test_the_loop_is_the_one_in_the_coordinates_of_the_tube():
     result = certify(load_text(joint(12)), COARSE)
     setting = setting_of(load_text(joint(12)), result)
     loop = loop_of(setting, "l1", Choice(source="distance"))
-    S, problem = setting.S, loop.problem
+    S, problem = setting.S, loop
     assert not np.allclose(problem.P, np.eye(4))
     own, its = (Fast(problem.adapts, problem.gains, P, 1, 1) for P in (problem.P, np.eye(4)))
     B = np.array([[0.0], [0.0], [0.0], [2 / 12]])

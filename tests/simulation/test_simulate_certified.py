@@ -106,14 +106,14 @@ def test_gains_of_the_certificate_are_promised_and_chosen_ones_are_not():
     _, result = certified("two_state", "0.4")
     pair = result.to_json()["distance"]["least_adaptation"]
     loop = loop_of(where, "l1", Choice())
-    assert (loop.problem.gains.bandwidth, loop.problem.gains.adaptation_rate) == (
+    assert (loop.gains.bandwidth, loop.gains.adaptation_rate) == (
         pair["bandwidth"],
         pair["adaptation_rate"],
     )
     assert loop.promise is not None
     assert "B distance" in loop.gains_are
     paper = loop_of(where, "l1", Choice(source="26"))
-    assert paper.problem.gains.adaptation_rate == result.to_json()["conditions_26"]["adaptation_rate"]
+    assert paper.gains.adaptation_rate == result.to_json()["conditions_26"]["adaptation_rate"]
     chosen = loop_of(where, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000)))
     assert chosen.promise is None
     assert chosen.gains_are == CHOSEN
@@ -129,7 +129,7 @@ def test_without_certified_gains_the_options_are_named():
     assert "--bandwidth and --adaptation-rate" in finding.help
     loop = loop_of(bare, "l1", Choice(bandwidth=Fraction(10), adaptation_rate=Fraction(1000)))
     assert loop.promise is None
-    assert loop.problem.gains.projection_radius >= where.uncertainty.h
+    assert loop.gains.projection_radius >= where.uncertainty.h
 
 
 def test_the_duration_is_the_horizon_unless_asked_for():
@@ -165,7 +165,7 @@ def test_a_loop_takes_the_gains_of_the_kind_that_is_asked_for(controller, wanted
     where = setting("two_state", "0.4")
     loop = loop_of(where, controller, Choice(source=wanted))
     recipe = where.result.proof.of[name_of(wanted).key]
-    assert loop.problem.gains.bandwidth == float(recipe.bandwidth)
+    assert loop.gains.bandwidth == float(recipe.bandwidth)
     assert loop.gains_are == f"certified by {name_of(wanted)}"
     assert (loop.promise is None) == (controller == "reference")
 

@@ -23,9 +23,9 @@ SEED = 0
 def gains(own, part=10):
     """They are a tenth of those that are certified."""
     loop = loop_of(own, "l1", Choice())
-    honest = loop.problem.gains
+    honest = loop.gains
     less = {name: getattr(honest, name) / part for name in ("bandwidth", "adaptation_rate")}
-    return own, replace(loop, problem=replace(loop.problem, gains=replace(honest, **less)))
+    return own, replace(loop, gains=replace(honest, **less))
 
 
 def lower_gains(own):

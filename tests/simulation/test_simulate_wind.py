@@ -39,7 +39,7 @@ def loop(kind):
 def test_a_run_is_that_of_the_plant_with_its_parameters():
     """The feedback alone against scipy: x' = f(x, theta) + B (k - what is told of h) written out."""
     setting = stirred("none")
-    problem = replace(loop("none").problem, times=np.linspace(0, 2, 5), horizon=2.0)
+    problem = replace(loop("none"), times=np.linspace(0, 2, 5), horizon=2.0)
     model = setting.model
     still = Disturbance.from_expressions(None, model, 1, 1)
     theta = np.array([[0.31], [0.02]])
@@ -68,7 +68,7 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
 def test_no_bound_is_exceeded_by_adversaries_whose_parameters_differ():
     setting, own = stirred("B"), loop("B")
     drawn = cases(setting, 3, range(60))
-    (runs,) = engine.integrate([drawn.of(own.problem)], tolerance=setting.tolerance)
+    (runs,) = engine.integrate([drawn.of(own)], tolerance=setting.tolerance)
     found = compare(setting, runs, own.promise)
     assert own.promise is not None
     assert not found.violations

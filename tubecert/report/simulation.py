@@ -42,7 +42,7 @@ class _Part:
     @property
     def counts(self) -> bool:
         """Whether the loop is meant to stay in the tube, and there are runs that say whether it does."""
-        return self.loop.tested and bool(self.comparison.worst)
+        return self.loop.adapts and bool(self.comparison.worst)
 
     def run(self, item: RunAt | Stopped | Violation) -> str:
         """Which run it was."""
@@ -55,7 +55,7 @@ def page_of(data: Campaign) -> Page:
     return Page(
         name=data.setting.spec.name,
         verdict=data.outcome,
-        summary=_because(data, [part.comparison for part in parts if part.loop.tested]),
+        summary=_because(data, [part.comparison for part in parts if part.loop.adapts]),
         meaning=CAVEAT,
         sections=tuple(Section.each(_sections(data, parts))),
         about="simulation",

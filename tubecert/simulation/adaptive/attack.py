@@ -87,7 +87,7 @@ def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress
         if report is not None:
             done, of = turn * _POPULATION, _ROUNDS * _POPULATION
             report(Step(phase=Phase.SIMULATION, name=f"{loop.controller}, adversary", done=done, of=of))
-        (runs,) = integrate([bred(setting, genes).of(loop.problem)], tolerance=setting.tolerance, count=count)
+        (runs,) = integrate([bred(setting, genes).of(loop)], tolerance=setting.tolerance, count=count)
         found = np.nan_to_num(runs.found.peak["distance"], nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, found])
         order = np.argsort(-values, kind="stable")[:_ELITE]

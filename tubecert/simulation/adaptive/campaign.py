@@ -127,7 +127,7 @@ class Campaign:
         """What all runs came to; a loop that is not meant to stay in the tube has no say but by a broken promise."""
         found = [*self.loops, *(self.members.loops if self.members else ())]
         found += [own for attack in self.attacks for own in (attack.random, attack.adversary) if own]
-        tested = [own.comparison for own in found if own.loop.tested]
+        tested = [own.comparison for own in found if own.loop.adapts]
         if any(own.comparison.violations for own in found):
             return "falsified"
         if any(own.left_the_tube for own in tested):
@@ -194,7 +194,7 @@ def simulate(
     if setting.h is None and replay is None:
         replay = 0
     own = _specified(setting) if replay is None else cases(setting, seed, [replay])
-    tested = [loop for loop in loops if loop.tested] if count else []
+    tested = [loop for loop in loops if loop.adapts] if count else []
     vectors = vectors_of(count if tested else 0, min(_FIRST, LANES), LANES)
     work = partial(_vector, setting, loops, own, seed)
     found = finished(work, vectors, executor, report, "loops and random runs")
@@ -233,8 +233,8 @@ def _specified(setting: Setting) -> Cases:
 
 def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numbers: range) -> list[Runs]:
     """Some random runs of every loop that adapts; before the first of them those of all loops that are drawn."""
-    drawn = [own.of(loop.problem) for loop in loops if not numbers.start]
-    random = [cases(setting, seed, numbers).of(loop.problem) for loop in loops if loop.tested and numbers]
+    drawn = [own.of(loop) for loop in loops if not numbers.start]
+    random = [cases(setting, seed, numbers).of(loop) for loop in loops if loop.adapts and numbers]
     found = integrate(drawn + random, tolerance=setting.tolerance)
     return [*found[: len(drawn)], *(runs.with_only(_KEPT) for runs in found[len(drawn) :])]
 
@@ -242,7 +242,7 @@ def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numb
 def _adversary(setting: Setting, random: Followed, seed: int, report: Progress | None) -> Followed:
     """The worst run that a search finds."""
     found = worst(setting, random.loop, seed, random.runs, report)
-    (runs,) = integrate([found.of(random.loop.problem)], tolerance=setting.tolerance)
+    (runs,) = integrate([found.of(random.loop)], tolerance=setting.tolerance)
     return Followed.judged(setting, random.loop, runs, found)
 
 
@@ -260,7 +260,7 @@ def follow(
 
     Of an interruption what is finished is kept; None if nothing is.
     """
-    tested = [loop for loop in loops if loop.tested]
+    tested = [loop for loop in loops if loop.adapts]
     found, defects = list[list[Runs]](), list[float]()
     with suppress(KeyboardInterrupt):
         while part := [*islice(plans, PLANS)]:
@@ -289,6 +289,6 @@ def _along(
     batches = list[list[Batch]]()
     for number, plan in enumerate(plans, first):
         own = cases(setting.along(plan), seed, range(number * each, (number + 1) * each))
-        batches.append([own.of(loop.along(plan).problem) for loop in loops])
+        batches.append([own.of(replace(loop, plan=plan)) for loop in loops])
     runs = integrate([batch for part in batches for batch in part], tolerance=setting.tolerance)
     return [joined([run.with_only(_KEPT) for run in runs[i :: len(loops)]]) for i in range(len(loops))]

@@ -10,7 +10,7 @@ import numpy as np
 from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.continuous import Continuous, reason
 from tubecert.simulation.adaptive.loops import Batch, Failure, Runs
-from tubecert.simulation.adaptive.times import START, Grid, steps, uniform
+from tubecert.simulation.adaptive.times import START, steps
 from tubecert.simulation.halving import Places, proposed, resolved
 from tubecert.simulation.lanes import Found, of_some
 
@@ -54,20 +54,14 @@ class _Lanes:
 
     def __init__(self, batches: Sequence[Batch], count: int | None) -> None:
         first = batches[0].problem
-        self._batches, self._count, self._P = batches, count, first.P
+        self._batches, self._P = batches, first.P
         self.plans = list({id(batch.problem.plan): batch.problem.plan for batch in batches}.values())
         self._ends = np.cumsum([0, *(len(batch.x0) for batch in batches)]).tolist()
         self.N, self.times = self._ends[-1], first.times if count is None else np.array([0.0, first.horizon])
-        self.grid = self._grid(0)
+        self.grid = steps(first, 0, self.plans, count)
         gains = [batch.problem.gains for batch in batches]
         radius = [np.inf if own is None else own.projection_radius for own in gains]
         self._room = np.repeat(radius, np.diff(self._ends)) * _ESTIMATE
-
-    def _grid(self, level: int) -> Grid:
-        first = self._batches[0].problem
-        if self._count is None:
-            return steps(first, level, self.plans)
-        return uniform(first, self._count, self.plans)
 
     def parts(self) -> list[tuple[Batch, int, int]]:
         """Every batch with its first lane, and the one after its last."""
@@ -76,7 +70,7 @@ class _Lanes:
     def system(self, lanes: Places, level: int) -> Continuous:
         """Some of the lanes at a level."""
         own = [batch.of(lanes[(lanes >= a) & (lanes < b)] - a) for batch, a, b in self.parts()]
-        grid = self._grid(level) if level else self.grid
+        grid = steps(self._batches[0].problem, level, self.plans) if level else self.grid
         return Continuous([batch for batch in own if len(batch.x0)], grid, self.plans)
 
     def apart(self, lanes: Places, finer: Found, coarser: Found) -> tuple[Array, Array]:

@@ -175,26 +175,11 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Loop:
-    """A closed loop: the problem, what its gains are, and the promise about it, if there is one."""
+class Loop(LoopProblem):
+    """A closed loop beside what its gains are, and the promise about it, if there is one."""
 
-    problem: LoopProblem
     gains_are: str
     promise: Promise | None
-
-    def along(self, plan: Plan) -> Loop:
-        """The same around another plan."""
-        return replace(self, problem=replace(self.problem, plan=plan))
-
-    @property
-    def controller(self) -> Controller:
-        """Its controller."""
-        return self.problem.controller
-
-    @property
-    def tested(self) -> bool:
-        """Whether leaving the tube counts: it estimates h, so it is meant to stay."""
-        return self.problem.adapts
 
     @property
     def covered(self) -> bool:
@@ -202,16 +187,11 @@ class Loop:
         return self.promise is not None
 
     @property
-    def gains(self) -> LoopGains | None:
-        """Its gains, if it filters."""
-        return self.problem.gains
-
-    @property
     def data(self) -> dict[str, object]:
         """What is told of it."""
         told = {"controller": self.controller, "gains_are": self.gains_are}
         gains = {} if self.gains is None else {"gains": to_json(self.gains)}
-        return told | {"covered": self.covered, "tested": self.tested} | gains
+        return told | {"covered": self.covered, "tested": self.adapts} | gains
 
 
 def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
@@ -221,24 +201,23 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
         message = "parameters known by ranges stand in B, and the loops are stated for a known B"
         help = "give each of them one value: --set system.parameters.NAME=VALUE"
         raise TubecertError([Finding(code="TC705", message=message, location=where, help=help)])
-    kind = name_of(choice.source)
-    problem = LoopProblem(
+    kind, adapts = name_of(choice.source), controller == "l1"
+    filters = adapts or controller == "reference"
+    gains, covered = _gains(setting, controller, choice) if filters else (None, False)
+    return Loop(
         model=setting.model,
         plan=setting.plan,
         controller=controller,
         horizon=setting.horizon,
         times=setting.times,
+        gains=gains,
         limit=_LIMIT * setting.greatest_radius,
         degree=_EVEN_DEGREE if _even(setting) else _DEGREE,
         P=setting.S.T @ setting.S,
         E=setting.E,
         rest=setting.rest,
-    )
-    gains, covered = _gains(setting, problem, choice) if problem.filters else (None, False)
-    return Loop(
-        problem=replace(problem, gains=gains),
         gains_are="no adaptation" if gains is None else f"certified by {kind}" if covered else CHOSEN,
-        promise=promise(setting, kind) if covered and problem.adapts else None,
+        promise=promise(setting, kind) if covered and adapts else None,
     )
 
 
@@ -247,16 +226,16 @@ def _even(own: Certified) -> bool:
     return own.upper is not None and own.upper <= _EVEN * (own.reach / own.rho) ** 2
 
 
-def _gains(setting: Setting, problem: LoopProblem, choice: Choice) -> tuple[LoopGains, bool]:
+def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[LoopGains, bool]:
     """The gains of a loop that filters, and whether they are those that a certificate proves."""
-    adapts, kind = problem.adapts, name_of(choice.source)
+    adapts, kind = controller == "l1", name_of(choice.source)
     proven, smooth = setting.proven(kind), setting.spec.adaptation.smooth
     bandwidth = choice.bandwidth or (None if proven is None else proven.bandwidth)
     rate = choice.adaptation_rate or (None if proven is None else proven.adaptation_rate)
     if bandwidth is None or (adapts and rate is None):
         lacks = ("--bandwidth", bandwidth is None), ("--adaptation-rate", adapts and rate is None)
         options = " and ".join(option for option, missing in lacks if missing)
-        message = f"{kind} certifies no gains for the controller {problem.controller}"
+        message = f"{kind} certifies no gains for the controller {controller}"
         help = f"choose {options} (then nothing is covered by the certificate), or another --gains"
         raise TubecertError([Finding(code="TC705", message=message, help=help)])
     # R_H where no certificate gives one: Dh, with what the smooth layer needs

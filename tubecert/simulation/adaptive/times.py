@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
@@ -76,42 +75,22 @@ def output_times(plan: Plan, horizon: float) -> Array:
     return np.array([0.0, *inner[every - 1 :: every], horizon]) if every else np.linspace(0.0, horizon, TIMES)
 
 
-def nearest(t: Array, wanted: Array) -> Array:
-    """Numbers of the entries of t (increasing) that are nearest to the wanted times."""
-    right = np.clip(np.searchsorted(t, wanted), 1, len(t) - 1)
-    return np.asarray(right - (wanted - t[right - 1] < t[right] - wanted))
+def steps(problem: LoopProblem, level: int, plans: Sequence[Plan], count: int | None = None) -> Grid:
+    """The steps of a level, each level with twice as many as the one before, along some plans.
 
-
-def steps(problem: LoopProblem, level: int, plans: Sequence[Plan]) -> Grid:
-    """The steps of a level, each level with twice as many as the one before, along some plans."""
-    t = corners(problem, plans)
-    counts = np.maximum(1, np.ceil(np.diff(t) / problem.horizon * _FEWEST_STEPS)).astype(np.int64) * 2**level
-    outputs = np.concatenate([[0], np.cumsum(counts)])[nearest(t, problem.times)]
-    return _grid(problem, plans, t, counts, outputs, level)
-
-
-def uniform(problem: LoopProblem, count: int, plans: Sequence[Plan]) -> Grid:
-    """So many equal steps, which pass over the corners of plans, and no output times but the ends."""
-    ends = np.array([0.0, problem.horizon])
-    return _grid(problem, plans, ends, np.array([count]), np.array([0, count]))
-
-
-def _grid(
-    problem: LoopProblem,
-    plans: Sequence[Plan],
-    t: Array,
-    counts: NDArray[np.int64],
-    outputs: NDArray[np.int64],
-    level: int = 0,
-) -> Grid:
-    """So many steps (C - 1,) between times (C,)."""
+    With a `count` so many equal ones, which pass over the corners of plans, and no output times but the ends.
+    """
+    t = corners(problem, plans) if count is None else np.array([0.0, problem.horizon])
+    fewest = np.ceil(np.diff(t) / problem.horizon * (count or _FEWEST_STEPS))
+    counts = np.maximum(1, fewest).astype(np.int64) * 2**level
     first = np.concatenate([[0], np.cumsum(counts)])
     length = np.repeat(np.diff(t) / counts, counts)
     start = np.repeat(t[:-1], counts) + (np.arange(first[-1]) - np.repeat(first[:-1], counts)) * length
+    seen = first if count else first[np.searchsorted(t, problem.times - 2 * _SAME * problem.horizon)]
     courses = [_course(problem, plan, start, length) for plan in plans]
     return Grid(
         level=level,
-        steps=Steps(np.append(start, problem.horizon), np.append(length, 0.0), outputs),
+        steps=Steps(np.append(start, problem.horizon), np.append(length, 0.0), seen),
         plan=Reference(*(np.stack(part, axis=-1) for part in zip(*courses, strict=True))),
     )
 
