@@ -94,7 +94,8 @@ def of_some(found: Found, lanes: NDArray[np.intp] | slice) -> Found:
 
 def follow(system: System) -> Found:
     """All steps of a system, from its start on."""
-    record, x, length = _Record(system), system.start(), system.steps.length.tolist()
+    x, length = system.start(), system.steps.length.tolist()
+    record = _Record(system)
     with np.errstate(all="ignore"):
         for step in range(len(length)):
             slope = system.at(step, 0, x)
@@ -122,7 +123,7 @@ class _Record:
         self._system, self._start, self._outputs = system, system.steps.start, system.steps.outputs
         self._rows, self._alive, self._first = list[dict[str, Array]](), list[NDArray[np.bool_]](), 0
         self._found: Found | None = None
-        self._ended = np.zeros(0)
+        self._ended = np.full(len(system.stopped), np.nan)
 
     def see(self, step: int, x: Array, slope: Array) -> None:
         """Keeps what is seen of the lanes that have come to a step."""
@@ -136,8 +137,6 @@ class _Record:
         stopped = self._system.stopped != 0
         if not stopped.any():
             return False
-        if not len(self._ended):
-            self._ended = np.full(len(stopped), np.nan)
         self._ended[stopped & np.isnan(self._ended)] = self._start[step]
         return bool(stopped.all())
 
@@ -175,7 +174,7 @@ class _Record:
             least=np.full(inputs, np.inf),
             greatest=np.full(inputs, -np.inf),
             stopped=self._system.stopped,
-            ended=np.full(N, np.nan),
+            ended=self._ended,
         )
 
     def closed(self) -> Found:
@@ -183,6 +182,4 @@ class _Record:
         if self._rows:
             self._take()
         assert self._found is not None
-        if len(self._ended):
-            self._found.ended[:] = self._ended
         return self._found

@@ -34,45 +34,15 @@ class Terms(NamedTuple):
     rest: Array
 
 
-class Plant:
-    """The terms of a model, evaluated at many states."""
-
-    def __init__(
-        self, model: ControlAffineModel, base: tuple[Expression, ...] | None, E: Matrix, rest: Matrix
-    ) -> None:
-        n, m, k = len(model.states), len(model.inputs), len(E[0]) if E else 0
-        inputs = (TIME, *model.states, *dict(model.parameters))
-        entries = [entry for row in model.B for entry in row]
-        constant = model.constant_input
-        self._constant = Tape(entries, ()).run_floats([], ()).reshape(n, m) if constant else None
-        outputs = [*model.f, *(base or [ZERO] * m), *(e for row in E for e in row), *(row[0] for row in rest)]
-        self._tape = Tape([*outputs, *([] if constant else entries)], inputs)
-        self._input = Tape(entries, inputs)
-        ends = np.cumsum([0, n, m, n * k, len(rest), 0 if constant else n * m]).tolist()
-        self._parts = [slice(a, b) for a, b in pairwise(ends)]
-        self._sizes = n, m, k
-
-    def terms(self, t: float, x: Array, theta: Array) -> Terms:
-        """At a time, states x (n, N) and parameters (p, N)."""
-        n, m, k = self._sizes
-        N = x.shape[1]
-        values = self._tape.run_floats_silenced([np.array(t), *x, *theta], (N,))
-        f, base, E, rest, B = (values[part] for part in self._parts)
-        own = B.reshape(n, m, N) if self._constant is None else self._constant
-        return Terms(f, own, base, E.reshape(n, k, N), rest)
-
-    def input(self, t: float, x: Array, theta: Array) -> Array:
-        """B alone, (n, m, N) or constant (n, m)."""
-        if self._constant is not None:
-            return self._constant
-        n, m, _ = self._sizes
-        return self._input.run_floats_silenced([np.array(t), *x, *theta], x.shape[1:]).reshape(n, m, -1)
-
-
 @lru_cache(maxsize=4)
-def plant(model: ControlAffineModel, base: tuple[Expression, ...] | None, E: Matrix, rest: Matrix) -> Plant:
-    """The plant of a problem, kept for its next level."""
-    return Plant(model, base, E, rest)
+def _tapes(
+    model: ControlAffineModel, base: tuple[Expression, ...] | None, E: Matrix, rest: Matrix
+) -> tuple[Tape, Tape]:
+    """f, base h, E, the rest and, where it moves, B, of t, states and parameters; B alone. Kept for the next level."""
+    inputs = (TIME, *model.states, *dict(model.parameters))
+    B, nothing = [entry for row in model.B for entry in row], [ZERO] * len(model.inputs)
+    outputs = [*model.f, *(base or nothing), *(e for row in E for e in row), *(row[0] for row in rest)]
+    return Tape([*outputs, *([] if model.constant_input else B)], inputs), Tape(B, inputs)
 
 
 class Acting:
@@ -84,7 +54,12 @@ class Acting:
         bases = {part.base for part in parts if part.base is not None}
         if len(bases) > 1:
             raise ValueError("lanes of one vector have one base of h")
-        self._plant = plant(model, next(iter(bases), None), E, rest)
+        n, m, k = self._sizes = len(model.states), len(model.inputs), len(E[0]) if E else 0
+        self._plant, self._input = _tapes(model, next(iter(bases), None), E, rest)
+        nothing = [np.zeros(())] * len(self._input.inputs)
+        self._B = self._input.run_floats(nothing, ()).reshape(n, m) if model.constant_input else None
+        ends = np.cumsum([0, n, m, n * k, len(rest), n * m * (self._B is None)]).tolist()
+        self._parts = [slice(a, b) for a, b in pairwise(ends)]
         sizes = [len(part.push) for part in parts]
         self._based = np.repeat([float(part.base is not None) for part in parts], sizes)
         self._own = Disturbance(
@@ -98,12 +73,16 @@ class Acting:
         )
 
     def terms(self, t: float, x: Array) -> Terms:
-        """The plant's terms, with the lanes' parameters."""
-        return self._plant.terms(t, x, self._theta)
+        """The plant's terms at a time and states x (n, N), with the lanes' parameters."""
+        (n, m, k), N = self._sizes, x.shape[1]
+        values = self._plant.run_floats_silenced([np.array(t), *x, *self._theta], (N,))
+        f, base, E, rest, B = (values[part] for part in self._parts)
+        return Terms(f, B.reshape(n, m, N) if self._B is None else self._B, base, E.reshape(n, k, N), rest)
 
     def input(self, t: float, x: Array) -> Array:
-        """B alone."""
-        return self._plant.input(t, x, self._theta)
+        """B alone, where it moves."""
+        values = self._input.run_floats_silenced([np.array(t), *x, *self._theta], x.shape[1:])
+        return values.reshape(*self._sizes[:2], -1)
 
     def h(self, t: float, x: Array, base: Array, push: Array) -> Array:
         """h (m, N) at x (n, N), where `push` (m, N) is B'M gamma_s."""
