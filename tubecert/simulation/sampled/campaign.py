@@ -5,7 +5,8 @@ Trusted: no; it can falsify a certificate, and never supports one.
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Sequence
+from functools import partial, reduce
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from tubecert.controller.recursion import linear
 from tubecert.executor import Serial
 from tubecert.progress import Progress
 from tubecert.simulation.sampled.attack import Attack, Flags
-from tubecert.simulation.sampled.loop import DIVERGED, Controllers, Seen, joined, resolved
+from tubecert.simulation.sampled.loop import DIVERGED, Controllers, Seen, resolved
 from tubecert.simulation.sampled.setting import Setting
 from tubecert.simulation.vectors import finished, vectors_of
 from tubecert.verdict import Verdict
@@ -42,7 +43,7 @@ def simulate(
     attack = Attack(setting, seed)
     asked, size = len(attack.aims) + runs, LANES if setting.spec.trajectory.bundle is None else _PLANS
     vectors, made = vectors_of(asked, min(_FIRST, size), size), controllers or partial(linear, setting.tables)
-    found = joined(finished(partial(resolved, attack, made), vectors, Serial(), report))
+    found = finished(partial(resolved, attack, made), vectors, Serial(), report)
     return Campaign(attack, certificate, asked, "c" if controllers else "floats", found)
 
 
@@ -88,33 +89,36 @@ class Passed(NamedTuple):
 
 
 class Campaign:
-    """What was `found` in `runs` of those that were `asked`, with the `controller` as exported C code or in floats.
+    """What was found in `runs` of those that were `asked`, with the `controller` as exported C code or in floats.
 
     `aimed` (N,): which were adversaries. `peaks`: of every state, then of every input, the largest `share`, (n + m, N),
-    its `value` of a `bound`, `when` in s; `by_stage` (2, n + m, G): of random runs and of adversaries in every stage
-    that was reached; `attained`: of any half-width. `error`: the largest of an integration, as a share of a half-width.
-    Where inputs `went`, how near obstacles were `passed`; which runs were `outside` of the tube by more than their
-    error and the plan's rounding.
+    its `value` of a `bound`, `when` in s; the largest of random runs and of adversaries by sample, `profile`
+    (2, n + m, K), in every stage that was reached, `by_stage` (2, n + m, G), of any half-width, `attained`. `errors`
+    (N,) of the integration as shares of a half-width, the largest `error`. Where inputs `went`, how near obstacles were
+    `passed`; which runs were `outside` of the tube by more than their error and the plan's rounding; `x` of some runs.
     """
 
     def __init__(
-        self, attack: Attack, certificate: str, asked: int, controller: Literal["c", "floats"], found: Seen
+        self,
+        attack: Attack,
+        certificate: str,
+        asked: int,
+        controller: Literal["c", "floats"],
+        found: Sequence[Seen],
     ) -> None:
         self.attack, self.certificate, self.asked, self.controller = attack, certificate, asked, controller
-        self.setting, self.found, self.runs = attack.setting, found, len(found.stopped)
-        own, (n, m), finite = self.setting, self.setting.loop.B.shape, np.nan_to_num
+        self.setting, self.x, (n, m) = attack.setting, found[0].x, attack.setting.loop.B.shape
+        joined = (np.concatenate(each, axis=-1) for each in zip(*(part[:4] for part in found), strict=True))
+        most, node, self._stopped, self.errors = joined
+        own, finite, self.runs = self.setting, np.nan_to_num, len(self._stopped)
         self.aimed: Flags = np.arange(self.runs) < len(attack.aims)
-        share, into, ends = np.split(found.most, [n + m, len(found.most) - 2 * m])
-        bound = np.take_along_axis(own.limits.T, found.node[: n + m], axis=1)
-        self.peaks = {
-            "share": share,
-            "value": share * bound,
-            "bound": bound,
-            "when": own.t[found.node[: n + m]],
-        }
+        share, into, ends = np.split(most, [n + m, len(most) - 2 * m])
+        bound = np.take_along_axis(own.limits.T, node[: n + m], axis=1)
+        self.peaks = {"share": share, "value": share * bound, "bound": bound, "when": own.t[node[: n + m]]}
+        self.profile = reduce(np.maximum, (part.profile for part in found))
         begun = own.stages[own.stages < own.samples]
-        self.by_stage = finite(np.maximum.reduceat(found.profile, begun, axis=2))
-        self.attained, self.error = float(self.by_stage[:, :n].max()), float(finite(found.error.max()))
+        self.by_stage = finite(np.maximum.reduceat(self.profile, begun, axis=2))
+        self.attained, self.error = float(self.by_stage[:, :n].max()), float(finite(self.errors.max()))
 
         proven = {use.input: (float(use.range[0]), float(use.range[1])) for use in own.result.inputs}
         went = zip(own.spec.inputs, *finite(ends.max(axis=1)).reshape(2, m).tolist(), strict=True)
@@ -128,11 +132,11 @@ class Campaign:
         own, n = self.setting, self.setting.loop.states
         states, inputs = np.split(own.bounds.T, [n])
         gain = np.max(abs(own.tables.N) @ states / inputs, axis=1)
-        error = np.where(np.isfinite(self.found.error), self.found.error, 0.0)
+        error = np.where(np.isfinite(self.errors), self.errors, 0.0)
         room = np.concatenate([np.ones(n), gain])[:, None] * error
         most = max(max(abs(went.least), abs(went.greatest)) for went in self.went.values())
         room[n:] += _SINGLE * most / inputs.min(axis=1)[:, None]
-        beyond = (self.peaks["share"] > 1 + _ROUNDING + room).any(axis=0) | (self.found.stopped == DIVERGED)
+        beyond = (self.peaks["share"] > 1 + _ROUNDING + room).any(axis=0) | (self._stopped == DIVERGED)
         return np.flatnonzero(beyond).tolist()
 
     @property

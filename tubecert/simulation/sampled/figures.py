@@ -22,9 +22,9 @@ _BOXES: Final = 400  # cross-sections of the tube that are drawn
 
 def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
     """Beside its summary, figures only of what was not interrupted; the same campaign gives the same bytes."""
-    found, names = campaign.found, np.array(campaign.setting.names)
-    more = {"error": found.error, "profile": found.profile, "aimed": campaign.aimed, "names": names}
-    yield "runs.npz", npz({**campaign.peaks, **more})
+    own, names = campaign, np.array(campaign.setting.names)
+    more = {"error": own.errors, "profile": own.profile, "aimed": own.aimed, "names": names}
+    yield "runs.npz", npz({**own.peaks, **more})
     if campaign.runs == campaign.asked:  # to draw takes longer than who is interrupted has
         yield from images(DRAWERS, campaign)
 
@@ -42,7 +42,7 @@ def _tube_use(campaign: Campaign) -> Figure:
     t, bounds = own.t[each], own.limits[each].T
     for i, (axis, name) in enumerate(zip(axes, own.names, strict=True)):
         axis.fill_between(t, 0, bounds[i], step="post", color=TUBE, alpha=0.25, lw=0, label="tube")
-        for (label, color), profile in zip(_GROUPS, campaign.found.profile, strict=True):
+        for (label, color), profile in zip(_GROUPS, campaign.profile, strict=True):
             axis.plot(t, profile[i] * bounds[i], color=color, lw=1.0, label=label)
         axis.set_ylabel(labelled(own.spec, name, f"|{name} - {name}*|"))
         axis.set_ylim(0, None)
@@ -65,7 +65,7 @@ def _plane(campaign: Campaign) -> Figure | None:
         shown = np.unique(np.linspace(0, own.samples - 1, _BOXES).astype(int))
         boxes = [plan[k] + corners * own.limits[k * parts, [i, j]] for k in shown]
     figure, axis = plane(own.spec, names, boxes, plan)
-    axis.plot(campaign.found.x[:, i], campaign.found.x[:, j], color=COLORS["l1"], lw=0.5, alpha=0.5)
+    axis.plot(campaign.x[:, i], campaign.x[:, j], color=COLORS["l1"], lw=0.5, alpha=0.5)
     axis.plot([], [], color=COLORS["l1"], lw=0.5, label="some runs")
     axis.autoscale_view()
     titled(figure, axis, _title(campaign), 4)

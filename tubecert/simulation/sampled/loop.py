@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial, reduce
+from collections.abc import Callable
+from functools import partial
 from math import ceil
 from typing import Final, NamedTuple, TypeAlias
 
@@ -41,15 +41,6 @@ class Seen(NamedTuple):
     error: Array
     x: Array
     profile: Array
-
-
-def joined(parts: Sequence[Seen]) -> Seen:
-    """One for several; states are those of the first."""
-    most, node, stopped, error = (
-        np.concatenate(each, axis=-1) for each in list(zip(*parts, strict=True))[:4]
-    )
-    profile = reduce(np.maximum, (part.profile for part in parts))
-    return Seen(most, node, stopped, error, parts[0].x, profile)
 
 
 def resolved(attack: Attack, made: Controllers, numbers: range) -> Seen:
