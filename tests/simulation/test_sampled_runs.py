@@ -16,22 +16,25 @@ from tubecert.simulation.sampled.setting import courses_of
 
 
 class Scripted(Lanes):
-    """Three lanes whose noise and wind are drawn beforehand, by samples; no slow signals."""
+    """Three lanes whose signals are drawn beforehand: noise and h by samples, wind by their parts."""
 
     def __init__(self, own):
         attack = Attack(own, seed=0)
         super().__init__(attack, range(len(attack.aims), len(attack.aims) + 3))
-        self.own[:] = own.h is not None
+        self.own[:] = False
 
     def noise(self, k):
         return np.random.default_rng([k + 1, 5]).uniform(-1, 1, self.off.shape)
 
     def wind(self, k):
-        return np.random.default_rng([k + 1, 4]).uniform(-1, 1, (self.setting.loop.E.shape[1], 3))
+        size = len(self.setting.lengths), self.setting.loop.E.shape[1], 3
+        return np.random.default_rng([k + 1, 4]).uniform(-1, 1, size)
+
+    def h(self, k):
+        return np.random.default_rng([k + 1, 3]).uniform(-1, 1, (len(self.setting.slow.size), 3))
 
     def signals(self, k, now=None):
-        parts = len(self.setting.lengths)
-        return self.noise(k), np.stack([self.wind(k)] * parts), np.zeros((len(self.setting.slow.size), 3))
+        return self.noise(k), self.wind(k), self.h(k)
 
 
 def run(own, level=1):
@@ -43,20 +46,21 @@ def run(own, level=1):
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", ["0", "0.025", "0.05", "0.125"])
 def test_commands_act_after_their_delay_as_matrix_exponentials_say(delay):
-    """Delays of 0, a half, 1 and 2.5 samples."""
-    own = setting("cart", ("delay: 0.02", f"delay: {delay}"), ("0.2*sin(t)", "0"), duration="2")
+    """Delays of 0, a half, 1 and 2.5 samples; h goes straight from sample to sample."""
+    own = setting("cart", ("delay: 0.02", f"delay: {delay}"), duration="2")
     path, lanes = run(own)
     Ts, tau, N = 0.05, float(delay), proven("cart").controller.N
     x = lanes.off
     commands: dict[int, np.ndarray] = {}
     for k in range(own.samples):
         commands[k] = N @ (x + lanes.noise(k))
-        ends = sorted({0.0, tau % Ts, Ts})
-        for begin, end in pairwise(ends):
+        for part, (begin, end) in enumerate(pairwise(map(float, own.nodes))):
             acting = int(np.floor((k * Ts + (begin + end) / 2 - tau) / Ts))
-            push = commands.get(acting, np.zeros((1, 3))) + lanes.wind(k)
-            both = expm(np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0]]) * (end - begin))
-            x = (both @ np.vstack([x, push]))[:2]
+            slope = (lanes.h(k) - lanes.h(k - 1)) / Ts
+            push = (
+                commands.get(acting, np.zeros((1, 3))) + lanes.wind(k)[part] + lanes.h(k - 1) + begin * slope
+            )
+            x = (expm(np.eye(4, 4, 1) * (end - begin)) @ np.vstack([x, push, slope]))[:2]
         np.testing.assert_allclose(path[k], x, atol=1e-12)
 
 

@@ -54,9 +54,9 @@ def resolved(attack: Attack, made: Controllers, numbers: range) -> Seen:
     for level in range(1, _HALVED + 1):
         coarse, found = found, Run(lanes, made, count * 2**level).seen()
         apart = np.nan_to_num(abs(found.x - coarse.x) / bounds).max(axis=(0, 1))  # nan: the plan is over
-        diverged = found.stopped == DIVERGED
-        found = found._replace(error=np.where(diverged, np.inf, 2 * apart))
-        if ((found.error <= _ENOUGH) | (diverged & (coarse.stopped == DIVERGED))).all():
+        far, before = found.stopped == DIVERGED, coarse.stopped == DIVERGED
+        found = found._replace(error=np.where(far | before, np.inf, 2 * apart))
+        if ((found.error <= _ENOUGH) | (far & before)).all():
             break
     return found._replace(x=found.x[..., ::_DRAWN])
 
