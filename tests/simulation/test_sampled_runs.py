@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from tubecert.controller.recursion import linear
 from tubecert.simulation.sampled.attack import Attack, Lanes
-from tubecert.simulation.sampled.loop import Run
+from tubecert.simulation.sampled.loop import NOBODYS, Run
 from tubecert.simulation.sampled.setting import courses_of
 
 
@@ -62,6 +62,32 @@ def test_commands_act_after_their_delay_as_matrix_exponentials_say(delay):
             )
             x = (expm(np.eye(4, 4, 1) * (end - begin)) @ np.vstack([x, push, slope]))[:2]
         np.testing.assert_allclose(path[k], x, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_the_h_of_a_specification_acts_beside_the_inputs():
+    """As if it were a part of f."""
+    inside = ("0.2*sin(t)", "0"), ("f: [v, 0]", 'f: [v, "0.2*sin(p)"]')
+    paths = []
+    for changes in ([("0.2*sin(t)", "0.2*sin(p)")], inside):
+        own = setting("cart", *changes, duration="1")
+        lanes, none = Scripted(own), np.zeros((len(own.slow.size), 3))
+        lanes.own[:], lanes.off[:], lanes.h = True, 0.05, lambda k, none=none: none
+        paths.append(Run(lanes, partial(linear, own.tables), 2).seen().x)
+    np.testing.assert_allclose(*paths, atol=1e-13)
+    assert abs(paths[0][-1] - run(setting("cart", duration="1"))[0][-1]).max() > 1e-3
+
+
+@pytest.mark.slow
+def test_of_a_plan_that_leaves_its_family_nothing_more_is_seen():
+    own = setting("pendulum", duration="0.4")
+    lanes = Scripted(own)
+    lanes.course = lanes.course._replace(ends=np.array([3, 99, 99]))
+    found = Run(lanes, partial(linear, own.tables), 2).seen()
+    assert found.stopped.tolist() == [NOBODYS, 0, 0]
+    assert found.node[:, 0].max() < 3 * len(own.lengths) < found.node[:, 1].max()
+    assert np.isnan(found.x[3:, :, 0]).all()
+    assert np.isfinite(found.x[:3]).all()
 
 
 @pytest.mark.slow
