@@ -54,6 +54,7 @@ def test_signals_and_starts_keep_to_their_bounds_however_small_kernels_are():
     np.testing.assert_allclose(worst_of(np.array([[3e-170, -4e-170]]), True), [[0.6, -0.8]])
     attack = Attack(setting("pendulum", duration="3"), seed=0)
     lanes = Lanes(attack, range(len(attack.aims) + 20))
+    assert 0.3 < np.isin(lanes.parameters, [0.9, 1.1]).mean() < 0.7, "half of the parameters are corners"
     starts = np.linalg.norm(lanes.off, axis=0)
     assert starts[lanes.aimed] == pytest.approx(0.02, rel=1e-12)
     assert starts.max() <= 0.02 * (1 + 1e-12)

@@ -1,7 +1,7 @@
 """The driver of the sampled loop and the engine: against other integrators, and exact exponentials."""
 
 from functools import partial
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 import pytest
@@ -76,6 +76,16 @@ def test_the_h_of_a_specification_acts_beside_the_inputs():
         paths.append(Run(lanes, partial(linear, own.tables), 2).seen().x)
     np.testing.assert_allclose(*paths, atol=1e-13)
     assert abs(paths[0][-1] - run(setting("cart", duration="1"))[0][-1]).max() > 1e-3
+
+
+@pytest.mark.slow
+def test_the_input_of_the_plan_is_that_of_the_time_in_which_a_command_acts():
+    """A controller that hands out what the plan holds from k Ts + delay on adds nothing; delay: 1.75 samples."""
+    own = setting("pendulum", ("delay: 0.015", "delay: 0.035"), duration="1")
+    lanes, j = Scripted(own), count(2)
+    found = Run(lanes, lambda _: lambda y, x, u: lanes.course.held[next(j)], 2).seen()
+    assert abs(np.diff(lanes.course.held, axis=0)).max() > 0.01
+    assert (found.most[2] == 0).all()
 
 
 @pytest.mark.slow
