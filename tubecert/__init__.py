@@ -16,8 +16,6 @@ if TYPE_CHECKING:  # a type checker reads this, and Python the table below: a na
     from tubecert.errors import TubecertError as TubecertError
     from tubecert.library.certification import Certification as Certification
     from tubecert.library.certifying import certify as certify
-    from tubecert.library.checks import Checked as Checked
-    from tubecert.library.checks import check as check
     from tubecert.library.comparing import Comparison as Comparison
     from tubecert.library.comparing import compare as compare
     from tubecert.library.exporting import Exported as Exported
@@ -35,7 +33,9 @@ if TYPE_CHECKING:  # a type checker reads this, and Python the table below: a na
     from tubecert.library.simulating import simulate as simulate
     from tubecert.library.simulation import SampledSimulation as SampledSimulation
     from tubecert.library.simulation import Simulation as Simulation
+    from tubecert.library.specification import Checked as Checked
     from tubecert.library.specification import Specification as Specification
+    from tubecert.library.specification import check as check
     from tubecert.library.specification import load as load
     from tubecert.library.specification import specification as specification
     from tubecert.library.sweeping import Swept as Swept
@@ -50,7 +50,6 @@ _ROWS = {
     "errors": "SpecError TargetError TubecertError",
     "library.certification": "Certification",
     "library.certifying": "certify",
-    "library.checks": "Checked check",
     "library.comparing": "Comparison compare",
     "library.exporting": "Exported export",
     "library.metrics": "SynthesisedMetric VerifiedMetric synth verify",
@@ -60,7 +59,7 @@ _ROWS = {
     "library.sampled": "SampledCertification",
     "library.simulating": "simulate",
     "library.simulation": "SampledSimulation Simulation",
-    "library.specification": "Specification load specification",
+    "library.specification": "Checked Specification check load specification",
     "library.sweeping": "Swept sweep",
     "progress": "Phase Step Unit",
     "release": "__version__",

@@ -49,8 +49,9 @@ def certify(
     """Prove the tube around the plan and find the smallest gains; always write the certificate."""
     from tubecert import certificate
     from tubecert.cli import telling
-    from tubecert.cli.report import check_pages, write_pages
+    from tubecert.cli.report import check_pages
     from tubecert.cli.telling import spare
+    from tubecert.library.pages import Report
     from tubecert.library.specification import Specification
     from tubecert.library.stated import page_of
     from tubecert.lint.plan import held
@@ -73,7 +74,8 @@ def certify(
     if output != certificate.STDOUT:
         found.save(output)
     new = _kept_metric(found, kept)
-    write_pages(report, found.certificate)
+    for target in report:
+        Report(certificate=found.certificate).save(target)
     told = [("plan", item.message) for item in held(system)]
     written = [("certificate", output), *(("page", page) for page in report), *_next(found, system, output)]
     page = page_of(found.certificate, all_of_it=how.verbose)

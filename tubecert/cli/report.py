@@ -5,14 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from tubecert.asking import CERTIFICATE, Text, words_of
 from tubecert.cli.adapter import Output, command
 from tubecert.library import pages
-
-if TYPE_CHECKING:
-    from tubecert.report.quantities import AnyCertificate
 
 _FILES: Final = "The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]"
 _WORDS: Final = {
@@ -68,12 +65,6 @@ def check_pages(targets: Sequence[str], taken: Mapping[str, str | None]) -> None
                 message = f"cannot write {page}: it is the {what} itself"
                 raise refused(message, "choose another file for the page")
         kept[f"page {page}"] = page
-
-
-def write_pages(targets: Sequence[str], sealed: AnyCertificate) -> None:
-    """Write the pages of a certificate. Raises `TargetError`."""
-    for page in targets:
-        pages.Report(certificate=sealed).save(page)
 
 
 def _beside(source: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +16,6 @@ from tubecert.library import metrics
 
 if TYPE_CHECKING:
     from tubecert.pipeline.synthesised import Synthesised
-    from tubecert.report.page import Page
     from tubecert.report.text import Rows
     from tubecert.spec import Setting, Spec
 
@@ -43,69 +43,66 @@ def synth(
     """Find a dual metric, round it, and write it only if C1-C3 are proven on the whole safe set."""
     from tubecert import certificate
     from tubecert.cli import telling
-    from tubecert.cli.telling import plan_of, present, refused, spare
     from tubecert.library.specification import Specification
-    from tubecert.report import synthesis, text
     from tubecert.report.terminal import Terminal
+    from tubecert.report.text import headline
     from tubecert.spec import load
 
     for place in filter(None, (output, plot)):
         certificate.check_target(place)
-        spare(place, {"specification": spec})
+        telling.spare(place, {"specification": spec})
     if plot and Path(plot).suffix.lower() != ".svg":
-        raise refused(f"cannot write {plot}: the comparison is drawn as SVG", "give a file FILE.svg")
+        message = f"cannot write {plot}: the comparison is drawn as SVG"
+        raise telling.refused(message, "give a file FILE.svg")
     system = load(spec, settings, "plant")
-    spare(output, {"plan": plan_of(spec, system)})
-    terminal = Terminal.stderr(color=how.color)
+    telling.spare(output, {"plan": telling.plan_of(spec, system)})
+    how = replace(how, json=how.json or output == certificate.STDOUT)
 
-    def judged(found: Synthesised) -> None:
+    def judged(so_far: Synthesised) -> None:
         """The verdict, before advice is looked for."""
         if not how.quiet:
-            terminal.show(text.headline(synthesis.page_of(found.search(), found.file, system.name)))
+            Terminal.stderr(color=how.color).show(headline(metrics.metric_of(so_far, system)._page()))
 
     kept = telling.kept(lambda so_far: _will(so_far, system, output, how))
     telling.warn_of_size(system, how)
     asked["table"] = asked["table"] or plot is not None
     with telling.shown(how, kept, judged) as progress:
         metric = metrics.synth(Specification(spec=system), **asked, progress=progress)
-    found = metric.found
     if metric.proven and output != certificate.STDOUT:
         metric.save(output)
-    if plot and found.rows:
+    if plot and metric.found.rows:
         from tubecert.report.figures_file import svg_file
         from tubecert.report.figures_gains import rate_figures
 
-        certificate.write_text(plot, svg_file(*rate_figures(found.search().table)))
-    present(how, *_presented(found, system, output, how))
-    if found.cut is not None and not metric.proven:
+        certificate.write_text(plot, svg_file(*rate_figures(metric.found.search().table)))
+    code = telling.answer(how, metric, _closing(metric, system, output))
+    if metric.found.cut is not None and not metric.proven:
         keeper.tell({"said": False})  # where it was is worth a word
-    return ExitCode.INTERRUPTED if found.cut == "interrupted" else found.verdict.exit_code
+    return code
 
 
-def _will(found: Synthesised, system: Spec, target: str, how: Output) -> keeper.Will | None:
+def _will(so_far: Synthesised, system: Spec, target: str, how: Output) -> keeper.Will | None:
     """What is left of a search that does not come to its end: the best metric, and the report about it."""
-    if found.file is None:
-        return None
     from tubecert import certificate
     from tubecert.cli.telling import text_of
 
-    files = {} if target == certificate.STDOUT else {target: certificate.dump(found.file.to_json())}
-    said = text_of(how, *_presented(found, system, target, how))
-    return {"files": files, "said": said, "code": found.verdict.exit_code.value}
+    if so_far.file is None:
+        return None
+    metric = metrics.metric_of(so_far, system)
+    said = text_of(
+        how, metric._page(), _closing(metric, system, target), metric._json() if how.json else None
+    )
+    files = {} if target == certificate.STDOUT else {target: metric.text()}
+    return {"files": files, "said": said, "code": metric.verdict.exit_code.value}
 
 
-def _presented(found: Synthesised, system: Spec, target: str, how: Output) -> tuple[Page, Rows, str | None]:
-    """The page, what was written and comes next and, where data are wanted, the metric file."""
-    from tubecert import certificate
+def _closing(metric: metrics.SynthesisedMetric, system: Spec, target: str) -> Rows:
+    """What was written and comes next."""
     from tubecert.printable import visible
-    from tubecert.records import to_json
-    from tubecert.report import synthesis
 
-    data, file = found.search(), found.file
-    certify = shlex.join(["tubecert", "certify", system.path, "--metric", target])
+    if not metric.proven:
+        return []
+    line = shlex.join(["tubecert", "certify", system.path, "--metric", target])
     if system.lacks:
-        certify = f"to certify with it, add {' and '.join(system.lacks)} to {visible(system.path)}"
-    closing = [] if file is None else [("metric file", target), ("next", certify)]
-    page = synthesis.page_of(data, file, system.name, system.states)
-    wanted = how.json or target == certificate.STDOUT
-    return page, closing, certificate.dump(to_json(file or data)) if wanted else None
+        line = f"to certify with it, add {' and '.join(system.lacks)} to {visible(system.path)}"
+    return [("metric file", target), ("next", line)]

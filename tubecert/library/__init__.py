@@ -6,9 +6,9 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 | module | what it does |
 |---|---|
 | `certifying`, `metrics`, `simulating`, `sweeping`, `rechecking` | functions with the names of commands |
-| `pages`, `comparing`, `exporting`, `checks` | the same |
+| `pages`, `comparing`, `exporting` | the same |
 | `certification`, `sampled`, `stated`, `simulation`, `reading`, `shown` | what they give, as values |
-| `plain`, `specification` | values of Python as a specification |
+| `plain`, `specification` | values of Python as a specification; `check` |
 | `workers` | who helps: processes, or a cluster |
 | `figures` | the tube and the trade-off, drawn into axes |
 """

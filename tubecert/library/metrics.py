@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from tubecert import asking
 from tubecert.asking import Number
-from tubecert.errors import SpecError
+from tubecert.errors import ExitCode, SpecError
 from tubecert.library.certifying import BUDGET, DEADLINE
 from tubecert.library.shown import Shown
 
@@ -107,6 +107,16 @@ class SynthesisedMetric(_Metric):
         from tubecert.report.synthesis import page_of
 
         return page_of(self.found.search(), self.file, self.name, self.states)
+
+    def _json(self) -> str:
+        from tubecert import certificate
+        from tubecert.records import to_json
+
+        return certificate.dump(to_json(self.file or self.found.search()))
+
+    @property
+    def _exit_code(self) -> ExitCode:
+        return ExitCode.INTERRUPTED if self.found.cut == "interrupted" else self.verdict.exit_code
 
 
 class VerifiedMetric(_Metric):
@@ -272,6 +282,11 @@ def synth(
     )
     if found.cut == "interrupted" and found.file is None and not asking.asker().options:
         raise KeyboardInterrupt
+    return metric_of(found, system)
+
+
+def metric_of(found: Synthesised, system: Spec) -> SynthesisedMetric:
+    """What a synthesis came to, as a value."""
     return SynthesisedMetric(found=found, name=system.name, states=system.states)
 
 

@@ -1,4 +1,4 @@
-"""Specifications for code: from a file, a mapping, or a text.
+"""Specifications for code: from a file, a mapping, or a text; what there is to say about one that is not certified yet.
 
 In: what a user has. Out: a `Specification`, which holds the `Spec` that commands read, or every problem as findings.
 """
@@ -7,21 +7,25 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from tubecert.asking import asker, named, text_of
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
 from tubecert.errors import SpecError
-from tubecert.findings import Finding, NamedPlace
+from tubecert.findings import Finding, NamedPlace, Severity
 from tubecert.library import plain
 from tubecert.library.plain import Data, Plain
+from tubecert.library.shown import Shown
 from tubecert.spec import Setting, Spec, canonical
 from tubecert.spec.canonical import as_file
 from tubecert.spec.load import VERSION, Reads, again, load_source, whole
 from tubecert.spec.source import Source, read_source
+
+if TYPE_CHECKING:
+    from tubecert.report.page import Page
 
 File: TypeAlias = str | os.PathLike[str]
 NAME: Final = "<specification>"  # what findings call a specification that is no file
@@ -156,3 +160,38 @@ def _source(data: Data | str) -> Source:
         return Source.of(NAME, data)
     whole = data if "tubecert" in data else {"tubecert": VERSION, **data}
     return Source.of(NAME, plain.document_text(whole))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checked(Shown):
+    """What was found in a specification: `findings`, each with its code, severity, message, place and help."""
+
+    name: str
+    findings: tuple[Finding, ...] = field(repr=False)
+
+    @property
+    def fine(self) -> bool:
+        """Whether nothing is wrong or suspicious: notes may be left."""
+        return all(item.severity is Severity.NOTE for item in self.findings)
+
+    def __str__(self) -> str:
+        from tubecert.report.findings import summary
+
+        return "\n".join(map(str, (*self.findings, summary(self.findings, 1))))
+
+    def _page(self) -> Page:
+        from tubecert.report.findings import page_of
+
+        return page_of(self.name, self.findings)
+
+
+def check(source: Specifiable, *, settings: Data | None = None) -> Checked:
+    """What a control engineer would ask about a specification: `tubecert check`.
+
+    A plan that misses its own dynamics, a declared bound that is broken, a metric that fails at a point: nothing that a
+    certificate rests on, but what is hardly meant. Raises `SpecError` as `load` does, where it cannot be read.
+    """
+    from tubecert import pipeline
+
+    found = load(source, settings=settings)
+    return Checked(name=found.name, findings=tuple(pipeline.inspect(found.spec)))
