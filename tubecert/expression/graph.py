@@ -228,11 +228,14 @@ def power(base: Expression, exponent: int) -> Expression:
 
 def sqrt(e: Expression) -> Expression:
     """Square root; of the square of a rational, that rational."""
-    if e.is_constant and e.fraction >= 0:
-        top, bottom = isqrt(e.fraction.numerator), isqrt(e.fraction.denominator)
-        if (top * top, bottom * bottom) == e.fraction.as_integer_ratio():
-            return constant(Fraction(top, bottom))
-    return _node("sqrt", (e,))
+    known = rational_root(e.fraction) if e.is_constant else None
+    return _node("sqrt", (e,)) if known is None else constant(known)
+
+
+def rational_root(q: Fraction) -> Fraction | None:
+    """The square root of a number, if it is rational."""
+    root = Fraction(isqrt(max(q.numerator, 0)), isqrt(q.denominator))
+    return root if root * root == q else None
 
 
 def _smooth(op: str, *known: Expression) -> Callable[[Expression], Expression]:

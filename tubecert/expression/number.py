@@ -135,9 +135,8 @@ def _ends(e: Expression) -> tuple[Fraction, Fraction]:
 
 def root_above(square: Fraction) -> Fraction:
     """The square root of a number that is not negative: exact if rational, else the next decimal of `DIGITS` digits."""
-    top, bottom = isqrt(square.numerator), isqrt(square.denominator)
-    if (top * top, bottom * bottom) == square.as_integer_ratio():
-        return Fraction(top, bottom)
+    if (exact := graph.rational_root(square)) is not None:
+        return exact
     places = DIGITS - (square.numerator.bit_length() - square.denominator.bit_length()) * 15051 // 100000
     scaled = square * Fraction(100) ** places
     return Fraction(isqrt(scaled.numerator // scaled.denominator) + 1) / Fraction(10) ** places

@@ -9,16 +9,18 @@ anything else proves nothing, unless only variables (and pi, which is transcende
 
 from __future__ import annotations
 
+from collections import Counter
 from fractions import Fraction
-from math import isqrt
+from typing import Final
 
-from tubecert.expression.graph import Expression, topological
+from tubecert.expression.graph import Expression, rational_root, topological
 
 Monomial = tuple[tuple[int, int], ...]  # (atom, exponent > 0), atoms ascending
 Polynomial = dict[Monomial, Fraction]
 Quotient = tuple[Polynomial, Polynomial]
 
-_UNIT: Monomial = ()
+_UNIT: Final[Monomial] = ()
+_ONE: Final[Polynomial] = {_UNIT: Fraction(1)}
 _MULTIPLE = 12  # addition theorems are used for at most this multiple of an angle,
 _TERMS = 4  # and for at most so many terms
 
@@ -69,11 +71,11 @@ class _Algebra:
     def _node(self, e: Expression, args: list[Quotient]) -> Quotient:
         match e.op:
             case "const":
-                return _number(e.fraction), _number(Fraction(1))
+                return _number(e.fraction), _ONE
             case "pi" | "symbol":
                 atom = self._atom((e.op, e.value))
                 self.polynomial_atoms.add(atom)
-                return _variable(atom), _number(Fraction(1))
+                return _variable(atom), _ONE
             case "add":
                 return self._sum(*args)
             case "mul":
@@ -93,18 +95,19 @@ class _Algebra:
                 return self._exponential(args[0])
             case "sinh" | "cosh" | "tanh":
                 return self._hyperbolic(e.op, args[0])
-            case "asin" | "acos" | "atan" | "log":
-                return _variable(self._atom((e.op, _frozen(_settled(*args[0]))))), _number(Fraction(1))
-            case "table":
-                key = (e.op, e.value, _frozen(_settled(*args[0])))
-                return _variable(self._atom(key)), _number(Fraction(1))
+            case "asin" | "acos" | "atan" | "log" | "table":
+                return self._new(e.op, e.value, _settled(*args[0]))
             case "sqrt":
                 return self._root(args[0])
             case "norm":
                 return self._norm(args)
-        return _variable(self._atom(e)), _number(Fraction(1))  # direction: known by its node only
+        return _variable(self._atom(e)), _ONE  # direction: known by its node only
 
     # polynomials
+
+    def _new(self, op: str, value: object, u: Quotient) -> Quotient:
+        """A function of `u` of which nothing more is known."""
+        return _variable(self._atom((op, value, _frozen(u)))), _ONE
 
     def _atom(self, key: object) -> int:
         return self.atoms.setdefault(key, len(self.atoms))
@@ -162,7 +165,7 @@ class _Algebra:
 
     def _power(self, base: Quotient, n: int) -> Quotient:
         base = _inverse(base) if n < 0 else base
-        result: Quotient = (_number(Fraction(1)), _number(Fraction(1)))
+        result: Quotient = _ONE, _ONE
         for bit in bin(abs(n))[2:]:
             result = self._product(result, result)
             if bit == "1":
@@ -173,13 +176,13 @@ class _Algebra:
 
     def _angle(self, u: Quotient) -> tuple[Quotient, Quotient]:
         """(sin u, cos u), by the addition theorems where `u` is a short sum of small multiples."""
-        one = _number(Fraction(1))
         terms = _multiples(u)
         if terms is None:
             sign, key = _signed(u)
             sine, cosine = self._basic_angle(("angle", key))
-            return (_scaled(sine, sign), one), (cosine, one)
-        s, c = _number(Fraction(0)), one
+            return (_scaled(sine, sign), _ONE), (cosine, _ONE)
+        s: Polynomial = {}
+        c = _ONE
         for unit, count in terms:
             sine, cosine = self._unit_angle(unit)
             sine = _scaled(sine, Fraction(1 if count > 0 else -1))
@@ -188,7 +191,7 @@ class _Algebra:
                     self._add(self._times(s, cosine), self._times(c, sine)),
                     self._add(self._times(c, cosine), _scaled(self._times(s, sine), Fraction(-1))),
                 )
-        return (s, one), (c, one)
+        return (s, _ONE), (c, _ONE)
 
     def _unit_angle(self, unit: tuple[Monomial, int]) -> tuple[Polynomial, Polynomial]:
         monomial, divisor = unit
@@ -203,52 +206,48 @@ class _Algebra:
         return _variable(sine), _variable(cosine)
 
     def _exponential(self, u: Quotient) -> Quotient:
-        one: Quotient = (_number(Fraction(1)), _number(Fraction(1)))
         terms = _multiples(u)
         if terms is None:
             sign, key = _signed(u)
-            atom: Quotient = (_variable(self._atom(("exp", key))), one[1])
+            atom = _variable(self._atom(("exp", key))), _ONE
             return atom if sign > 0 else _inverse(atom)
-        result = one
+        result: Quotient = _ONE, _ONE
         for unit, count in terms:
-            factor: Quotient = (_variable(self._atom(("unit exp", unit))), one[1])
+            factor = _variable(self._atom(("unit exp", unit))), _ONE
             result = self._product(result, self._power(factor, count))
         return result
 
     def _hyperbolic(self, op: str, u: Quotient) -> Quotient:
         """sinh u = (e - 1/e)/2 and cosh u = (e + 1/e)/2 with e = exp(u); tanh is their quotient."""
         e = self._exponential(u)
-        one = (_number(Fraction(1)), _number(Fraction(1)))
         square = self._product(e, e)
-        minus = self._sum(square, (_number(Fraction(-1)), one[1]))
-        plus = self._sum(square, one)
+        minus = self._sum(square, (_number(Fraction(-1)), _ONE))
+        plus = self._sum(square, (_ONE, _ONE))
         if op == "tanh":
             return self._product(minus, _inverse(plus))
         return self._product(minus if op == "sinh" else plus, _inverse((_scaled(e[0], Fraction(2)), e[1])))
 
     def _root(self, u: Quotient) -> Quotient:
-        one = _number(Fraction(1))
         if not u[0]:
-            return {}, one
-        if u[1] == one and list(u[0]) == [_UNIT] and (exact := _exact_root(u[0][_UNIT])) is not None:
-            return _number(exact), one
+            return {}, _ONE
+        if u[1] == _ONE and list(u[0]) == [_UNIT] and (exact := rational_root(u[0][_UNIT])) is not None:
+            return _number(exact), _ONE
         atom = self._atom(("sqrt", _frozen(u)))
-        if u[1] == one:
+        if u[1] == _ONE:
             self.squares[atom] = u[0]
-        return _variable(atom), one
+        return _variable(atom), _ONE
 
     def _norm(self, args: list[Quotient]) -> Quotient:
-        one = _number(Fraction(1))
         kept = [arg for arg in args if arg[0]]
         if not kept:
-            return {}, one
-        atom = self._atom(("norm", frozenset(_count([_signed(arg)[1] for arg in kept]).items())))
-        if all(arg[1] == one for arg in kept):
+            return {}, _ONE
+        atom = self._atom(("norm", frozenset(Counter(_signed(arg)[1] for arg in kept).items())))
+        if all(arg[1] == _ONE for arg in kept):
             total: Polynomial = {}
             for arg in kept:
                 total = self._add(total, self._times(arg[0], arg[0]))
             self.squares[atom] = total
-        return _variable(atom), one
+        return _variable(atom), _ONE
 
 
 def _number(value: Fraction) -> Polynomial:
@@ -307,22 +306,11 @@ def _frozen(u: Quotient) -> object:
     return frozenset(u[0].items()), frozenset(u[1].items())
 
 
-def _count(keys: list[object]) -> dict[object, int]:
-    return {key: keys.count(key) for key in keys}
-
-
 def _multiples(u: Quotient) -> list[tuple[tuple[Monomial, int], int]] | None:
     """`u` as a short sum of small integer multiples of unit angles (monomial / divisor), or None."""
     top, bottom = u
-    if bottom != _number(Fraction(1)) or len(top) > _TERMS:
+    if bottom != _ONE or len(top) > _TERMS:
         return None
     if any(abs(c.numerator) > _MULTIPLE for c in top.values()):
         return None
     return [((monomial, c.denominator), c.numerator) for monomial, c in sorted(top.items())]
-
-
-def _exact_root(q: Fraction) -> Fraction | None:
-    if q < 0:
-        return None
-    root = Fraction(isqrt(q.numerator), isqrt(q.denominator))
-    return root if root * root == q else None
