@@ -1,12 +1,14 @@
 """Tubes measured by the metric, end to end: gains depend on no units, only half-widths must fit into the safe set."""
 
 import re
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from texts import CONFIGS
 
+from tubecert.bounds.level import too_wide
 from tubecert.certificate.result import Result
 from tubecert.claims.advice import FitTube
 from tubecert.claims.statements import HalfWidthFits, PlanInSafeSet, StartInTube, TubeInSafeSet
@@ -19,6 +21,7 @@ from tubecert.simulation.adaptive.flows import Fast
 from tubecert.simulation.adaptive.judge import compare
 from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
 from tubecert.spec import load, load_text
+from tubecert.tube import Containment
 from tubecert.verdict import Verdict
 
 COARSE = Options(gap=Fraction(1, 5))
@@ -166,6 +169,14 @@ def test_what_the_tube_does_not_reach_need_not_fit(asked):
     found = certify(text, COARSE, brief=True)
     assert found.verdict is Verdict.CERTIFIED
     assert found.tube.half_widths["q"] <= 0.4
+
+
+def test_where_it_is_not_known_how_far_the_plan_goes_no_half_width_is_too_wide():
+    """A curve that could not be bounded has an excess that stands for nothing."""
+    contained = Containment(state="q", side="upper", excess=Fraction(-1), room=Fraction(-1))
+    assert too_wide(Fraction(1, 10), contained, Fraction(5)) is None
+    leaves = replace(contained, verdict=Verdict.REFUTED, excess=Fraction(1))
+    assert too_wide(Fraction(1, 10), leaves, Fraction(5)) == Fraction("5.9")
 
 
 def test_what_a_tube_by_radii_reaches_in_coordinates_of_its_own_refutes_nothing():

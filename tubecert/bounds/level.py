@@ -105,7 +105,11 @@ def _narrower(states: Sequence[str], found: Radius, asked: Sequence[Fraction | N
 
 def too_wide(side: Fraction, contained: Containment, asked: Fraction | None) -> Fraction | None:
     """By how much the half-width `asked` does not fit, where a tube that is `side` wide leaves; None if it fits."""
-    beyond = Fraction(0) if asked is None else contained.excess + asked - side
+    if (
+        asked is None or contained.verdict is not Verdict.REFUTED
+    ):  # else `excess` may stand for what is not known
+        return None
+    beyond = contained.excess + asked - side
     return beyond if beyond > 0 else None
 
 
