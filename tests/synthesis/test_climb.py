@@ -18,7 +18,7 @@ from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.statements import TubeInSafeSet
 from tubecert.expression import scan
 from tubecert.model import build
-from tubecert.pipeline import Deadline, Options, synthesis
+from tubecert.pipeline import Deadline, Listeners, Options, synthesis
 from tubecert.pipeline.climb import Climb, slow_scale
 from tubecert.pipeline.synthesised import Row, Synthesised
 from tubecert.spec import Synthesis, load, load_text
@@ -274,23 +274,21 @@ class Clock:
         if self.left < 0:
             raise synthesis.OutOfTime
 
-    watched = Deadline.watched
-
 
 @pytest.mark.slow
 def test_a_deadline_leaves_the_best_that_was_proven():
     """It cuts the list of metrics that are tried and no proof; without any there is nothing, and that is said."""
     patient = Clock(10**9)
-    whole = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, deadline=patient)
+    whole = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, Listeners(deadline=patient))
     assert whole.data().search.cut is None
     half = Clock((10**9 - patient.left) // 2)
-    cut = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, deadline=half)
+    cut = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, Listeners(deadline=half))
     assert cut.data().search.cut == "deadline"
     assert cut.verdict is Verdict.CERTIFIED
     assert {row.rate for row in cut.rows} < {row.rate for row in whole.rows}
     kept = {(row.rate, row.degree): row.adaptation_rate for row in whole.rows}
     assert all(kept[row.rate, row.degree] == row.adaptation_rate for row in cut.rows)
-    none = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, deadline=Deadline.after(0))
+    none = pipeline.synthesise(robot("van_der_pol"), BARE, BY_B, Listeners(deadline=Deadline.after(0)))
     assert (none.verdict, none.cut, none.file) == (Verdict.UNDECIDED, "deadline", None)
     assert isinstance(none.reason.claim.failure, NothingFound)
 
@@ -346,7 +344,7 @@ def test_the_verdict_is_told_before_advice(monkeypatch):
     monkeypatch.setattr(synthesis, "remedies", remedies)
     lonely = load_text(CHAIN.format(slope=0, p=1, v=1).replace("f: [v", 'f: ["p**2 - p"'))
     wanted = Synthesis(rate=Fraction(1, 2), objective="condition", degree=0)
-    pipeline.synthesise(lonely, wanted, Options(), told=said.append)
+    pipeline.synthesise(lonely, wanted, Options(), Listeners(told=said.append))
     assert isinstance(said[0], Synthesised)
     assert said[0].verdict is Verdict.UNDECIDED
     assert said[1] == "advice"
@@ -356,7 +354,7 @@ def test_the_verdict_is_told_before_advice(monkeypatch):
 def test_advice_costs_no_more_than_the_search():
     lonely = load_text(CHAIN.format(slope=0, p=1, v=1).replace("f: [v", 'f: ["p**2 - p"'))
     wanted = Synthesis(rate=Fraction(1, 2), objective="condition", degree=0)
-    run = synthesis.SynthesisRun(lonely, wanted, Options(), pipeline.question_of, None)
+    run = synthesis.SynthesisRun(lonely, wanted, Options(), Listeners())
     spent = []
     honest = run.ladder.cheap
 

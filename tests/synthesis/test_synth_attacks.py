@@ -20,7 +20,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.expression import scan
 from tubecert.metric.verify import verify_metric
 from tubecert.model import build
-from tubecert.pipeline import Options, synthesis, synthesised
+from tubecert.pipeline import Listeners, Options, synthesis, synthesised
 from tubecert.spec import Synthesis, load_text
 from tubecert.spec.metric_file import with_metric
 from tubecert.synthesis.diagnose import uncontrollable_mode
@@ -210,7 +210,7 @@ def test_the_file_says_what_is_true_of_what_it_holds(name, tmp_path):
 @pytest.mark.slow
 def test_the_greatest_margin_falls_back_on_the_metric_at_the_rate(monkeypatch):
     """A metric of a larger rate whose second proof fails is not the end."""
-    run = synthesis.SynthesisRun(load_text(small()), WISHES["margin"], Options(), pipeline.certify, None)
+    run = synthesis.SynthesisRun(load_text(small()), WISHES["margin"], Options(), Listeners())
     monkeypatch.setattr(synthesis.SynthesisRun, "_at_rate", lambda self, metric, rate: None)
     found = run.run(table=False)
     assert found.verdict == "certified"

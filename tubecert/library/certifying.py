@@ -131,16 +131,11 @@ def certify(
         budget=budget or usual.budget,
     )
     run = ran("tubecert.certify")
-    limit = None if deadline is None else pipeline.Deadline.after(float(deadline))
+    listeners = pipeline.Listeners(
+        kept=asking.hears(progress, "kept"), deadline=pipeline.Deadline.after(deadline)
+    )
     with held(workers_of(jobs, scheduler)) as workers:
-        result = pipeline.certify(
-            whole,
-            options,
-            timed(progress),
-            deadline=limit,
-            kept=asking.hears(progress, "kept"),
-            workers=workers,
-        )
+        result = pipeline.certify(whole, options, timed(progress), listeners=listeners, workers=workers)
     sealed = certificate.seal(result.to_json(), run())
     return certification_of(sealed, Specification(spec=overridden(whole, options)))
 

@@ -272,11 +272,13 @@ def synth(
         system,
         wanted_of(system, **said),
         options if budget is None else replace(options, budget=budget),
-        timed(progress),
+        pipeline.Listeners(
+            progress=timed(progress),
+            told=asking.hears(progress, "judged"),
+            kept=asking.hears(progress, "kept"),
+            deadline=pipeline.Deadline.after(deadline),
+        ),
         table=table,
-        deadline=None if deadline is None else pipeline.Deadline.after(float(deadline)),
-        told=asking.hears(progress, "judged"),
-        kept=asking.hears(progress, "kept"),
         # a tube that needs no adaptation is enough where neither an objective nor another certificate is asked for
         enough=objective is None and system.decides in (None, ALONE.option),
     )

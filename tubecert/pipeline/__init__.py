@@ -16,7 +16,6 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -24,10 +23,10 @@ from tubecert.certificate.result import Result
 from tubecert.executor import Executor
 from tubecert.letters import ALONE
 from tubecert.metric.verify import Proofs
-from tubecert.pipeline.certification import answer, result
-from tubecert.pipeline.checks import inspect, missing_parts, missing_sections, sound_time, unsearchable
+from tubecert.pipeline.certification import answer, question_of, result
+from tubecert.pipeline.checks import inspect, missing_sections, sound_time, unsearchable
 from tubecert.pipeline.counting import counted
-from tubecert.pipeline.deadline import Deadline
+from tubecert.pipeline.deadline import Deadline, Listeners
 from tubecert.progress import Progress
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.question import Memory, Options, Question, Stopped, overridden
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Deadline",
+    "Listeners",
     "Memory",
     "Options",
     "Result",
@@ -53,25 +53,22 @@ def certify(
     progress: Progress | None = None,
     memory: Memory | None = None,
     *,
-    deadline: Deadline | None = None,
-    kept: Callable[[Synthesised], None] | None = None,
+    listeners: Listeners | None = None,
     workers: Executor | None = None,
     brief: bool = False,
 ) -> Result:
     """The result for a specification; raises `SpecError` for what makes the question meaningless.
 
-    With a `memory` that is shared between calls, what does not depend on what changed is not proven again. `deadline`:
-    a metric that is looked for is by then the best that was found, `kept` hears what there is after every attempt.
-    `workers` search parts of long suprema: what comes out does not depend on them. `brief`: the verdict, and the gains
-    of what decides; no curves, no other kinds, and nothing that explains.
+    With a `memory` that is shared between calls, what does not depend on what changed is not proven again. `listeners`
+    are those of a metric that is looked for, beside `progress`. `workers` search parts of long suprema: what comes out
+    does not depend on them. `brief`: the verdict, and the gains of what decides; no curves, no other kinds, and nothing
+    that explains.
     """
     question = replace(question_of(spec, options, progress, memory), workers=workers, brief=brief)
-    return result(_end(question, deadline, kept))
+    return result(_end(question, replace(listeners or Listeners(), progress=question.progress)))
 
 
-def _end(
-    question: Question, deadline: Deadline | None, kept: Callable[[Synthesised], None] | None
-) -> Stage | Stopped:
+def _end(question: Question, listeners: Listeners) -> Stage | Stopped:
     """How the certification ends."""
     spec = question.spec
     if spec.metric is not None or spec.synthesis is None:
@@ -80,9 +77,7 @@ def _end(
         spec,
         spec.synthesis,
         question.options,
-        question.progress,
-        deadline=deadline,
-        kept=kept,
+        listeners,
         enough=(question.options.conditions or spec.decides) in (None, ALONE.option),
         proofs=question.memory.proofs,
     )
@@ -92,38 +87,20 @@ def _end(
     return answer(counted(question)) if found.reason is None else Stopped(at=question, reason=found.reason)
 
 
-def question_of(
-    spec: Spec, options: Options, progress: Progress | None = None, memory: Memory | None = None
-) -> Question:
-    """The question that options make of a specification; raises `SpecError` if it is meaningless."""
-    spec = overridden(spec, options)
-    return Question(
-        spec=spec,
-        options=options,
-        time=sound_time(spec, options, missing_parts),
-        progress=progress,
-        memory=Memory() if memory is None else memory,
-    )
-
-
 def synthesise(
     spec: Spec,
     wanted: Synthesis,
     options: Options,
-    progress: Progress | None = None,
+    listeners: Listeners | None = None,
     *,
     table: bool = False,
-    deadline: Deadline | None = None,
-    told: Callable[[Synthesised], None] | None = None,
-    kept: Callable[[Synthesised], None] | None = None,
     enough: bool = False,
     proofs: Proofs | None = None,
 ) -> Synthesised:
     """A proven metric for a specification, or why there is none; with `table` others over a range of rates beside it.
 
-    `told` hears why there is none before advice is looked for, `kept` what there is after every attempt. At the
-    `deadline`, and at an interruption, the best that was proven by then is what comes out (`Synthesised.cut`). `proofs`
-    of metrics are taken from there, and kept there. `enough`: a metric whose tube needs no adaptation is.
+    At a deadline, and at an interruption, the best that was proven by then is what comes out (`Synthesised.cut`).
+    `proofs` of metrics are taken from there, and kept there. `enough`: a metric whose tube needs no adaptation is.
     Raises `SpecError` for what makes the question meaningless, and for a solver that is not installed.
     """
     from tubecert.pipeline.synthesis import SynthesisRun  # solvers, only where they are needed
@@ -132,16 +109,5 @@ def synthesise(
     required(wanted.solver)
     spec = replace(overridden(spec, options), metric=None, synthesis=None)
     sound_time(spec, options, lambda own: [*unsearchable(own), *missing_sections(own, wanted)])
-    run = SynthesisRun(
-        spec,
-        wanted,
-        options,
-        question_of,
-        progress,
-        deadline=deadline,
-        told=told,
-        kept=kept,
-        enough=enough,
-        proofs=proofs,
-    )
+    run = SynthesisRun(spec, wanted, options, listeners or Listeners(), enough=enough, proofs=proofs)
     return run.run(table=table)

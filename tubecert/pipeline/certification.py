@@ -16,20 +16,36 @@ from tubecert.claims.family import Reason
 from tubecert.conditions.problem import TubeProblem
 from tubecert.kinds.table import KINDS, kind_of
 from tubecert.lint.codes import NOTABLE_DEFECT
+from tubecert.pipeline.checks import missing_parts, sound_time
 from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
+from tubecert.progress import Progress
 from tubecert.search.coordinates import Wish, propose
 from tubecert.search.proposers import PROPOSERS, Explained, Proposer
-from tubecert.spec import canonical
+from tubecert.spec import Spec, canonical
 from tubecert.stages.bounded import Bounded, Enclosed, bound
 from tubecert.stages.judged import Judged, deciding, judge_all
 from tubecert.stages.metric import ProvenMetric, prove_metric
-from tubecert.stages.question import Question, Stopped
+from tubecert.stages.question import Memory, Options, Question, Stopped, overridden
 from tubecert.stages.result import Explanation, Stage, result_of
 from tubecert.stages.tube import Planned, TubeFound, asked_half_widths, find_tube, lay, radii, room_of
 from tubecert.trajectory.make import remedy
 from tubecert.verdict import Verdict
+
+
+def question_of(
+    spec: Spec, options: Options, progress: Progress | None = None, memory: Memory | None = None
+) -> Question:
+    """The question that options make of a specification; raises `SpecError` if it is meaningless."""
+    spec = overridden(spec, options)
+    return Question(
+        spec=spec,
+        options=options,
+        time=sound_time(spec, options, missing_parts),
+        progress=progress,
+        memory=Memory() if memory is None else memory,
+    )
 
 
 def answer(question: Question) -> Stage | Stopped:

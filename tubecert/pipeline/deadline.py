@@ -1,4 +1,4 @@
-"""When a search has to come to an end: what is proven by then is what it comes out with.
+"""Who hears of a search, and when it has to come to an end: what is proven by then is what it comes out with.
 
 A deadline cuts the list of what is tried and never a proof; the result says that it was cut.
 """
@@ -6,11 +6,15 @@ A deadline cuts the list of what is tried and never a proof; the result says tha
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from math import inf
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, SupportsFloat
 
 from tubecert.progress import Progress, Step
+
+if TYPE_CHECKING:
+    from tubecert.pipeline.synthesised import Synthesised
 
 Cut = Literal["deadline", "interrupted", "no_adaptation", "plan"]
 """What ended a search before its end: time, somebody, a tube that needs no adaptation, a plan that no metric serves."""
@@ -27,24 +31,34 @@ class Deadline:
     at: float = inf
 
     @staticmethod
-    def after(seconds: float) -> Deadline:
-        """So many seconds from now."""
-        return Deadline(time.monotonic() + seconds)
+    def after(seconds: SupportsFloat | str | None) -> Deadline:
+        """So many seconds from now; without a number there is none."""
+        return Deadline() if seconds is None else Deadline(time.monotonic() + float(seconds))
 
     def check(self) -> None:
         """Raises `OutOfTime` once it has passed."""
         if time.monotonic() > self.at:
             raise OutOfTime
 
-    def watched(self, progress: Progress | None) -> Progress:
-        """The same progress, which raises `OutOfTime` at the first step after it."""
 
-        def told(step: Step) -> None:
-            self.check()
-            if progress is not None:
-                progress(step)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Listeners:
+    """Who hears of a search, and until when it goes on.
 
-        return told
+    `progress` hears every step, `told` why there is no metric, before advice is looked for, `kept` what there is after
+    every attempt. At the `deadline` what is proven by then is what comes out.
+    """
+
+    progress: Progress | None = None
+    told: Callable[[Synthesised], None] | None = None
+    kept: Callable[[Synthesised], None] | None = None
+    deadline: Deadline = field(default_factory=Deadline)
+
+    def __call__(self, step: Step) -> None:
+        """Passes a step on; raises `OutOfTime` at the first one after the deadline."""
+        self.deadline.check()
+        if self.progress is not None:
+            self.progress(step)
 
 
 def cut_by(end: BaseException) -> Cut:

@@ -7,7 +7,6 @@ text that a metric file will hold, and is what its proof is about.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from math import inf
@@ -42,9 +41,10 @@ from tubecert.errors import SpecError
 from tubecert.metric.verify import MetricProof, Proofs
 from tubecert.model import build, rank_decision
 from tubecert.pipeline.candidates import judged_row, measured_in
+from tubecert.pipeline.certification import question_of
 from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, pace, slow_scale
-from tubecert.pipeline.deadline import Cut, Deadline, OutOfTime, cut_by
+from tubecert.pipeline.deadline import Cut, Deadline, Listeners, OutOfTime, cut_by
 from tubecert.pipeline.synthesised import Row, Synthesised, TooLongError, file_of, read_back, shorter
 from tubecert.pipeline.unfound import (
     equilibria,
@@ -54,7 +54,7 @@ from tubecert.pipeline.unfound import (
     remedies,
     tried,
 )
-from tubecert.progress import Phase, Progress, Step, Unit
+from tubecert.progress import Phase, Step, Unit
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.question import Memory, Options, Question
 from tubecert.synthesis.diagnose import uncontrollable_mode
@@ -68,15 +68,11 @@ _RATES = 5  # of a table
 _GAP = Fraction(1, 5)  # to which constants are known where metrics are compared
 _BOXES = 100_000  # and what each claim may cost there
 
-Ask = Callable[[Spec, Options, Progress, Memory], Question]
-Told = Callable[["Synthesised"], None]
-
 
 class SynthesisRun:
     """One synthesis: its ladder, and the certifications that metrics are compared by.
 
-    `ask` makes a question of a specification; `told` hears a verdict before advice is looked for, `kept` what there is
-    after every attempt; `enough`: a metric whose tube needs no adaptation is.
+    `enough`: a metric whose tube needs no adaptation is.
     """
 
     def __init__(
@@ -84,24 +80,18 @@ class SynthesisRun:
         spec: Spec,
         wanted: Synthesis,
         options: Options,
-        ask: Ask,
-        progress: Progress | None,
+        listeners: Listeners,
         *,
-        deadline: Deadline | None = None,
-        told: Told | None = None,
-        kept: Told | None = None,
         enough: bool = False,
         proofs: Proofs | None = None,
     ) -> None:
-        self.spec, self.wanted, self.options, self.ask = spec, wanted, options, ask
+        self.spec, self.wanted, self.options, self.listeners = spec, wanted, options, listeners
         self.model = build(replace(spec, metric=None))
-        self.progress, self.told, self.kept = progress, told, kept
-        self.deadline = deadline or Deadline()
         self.memory = Memory(proofs=proofs or Proofs())
         whole_way = wanted.objective in ("adaptation", "tube")
         budget = min(options.budget, _BOXES) if whole_way and wanted.rate is None else options.budget
         self.effort = Effort(
-            gap=float(options.gap), budget=budget, progress=lambda step: self.deadline.check()
+            gap=float(options.gap), budget=budget, progress=lambda step: self.listeners.deadline.check()
         )
         self.limit = None if wanted.condition_number is None else float(wanted.condition_number)
         self.ladder = Ladder(
@@ -162,7 +152,7 @@ class SynthesisRun:
 
     def _so_far(self, end: BaseException) -> VerifiedMetric | None:
         """The best of what is proven when the search is cut short; an interruption goes on if nothing was judged."""
-        self.deadline, self.cut = Deadline(), cut_by(end)
+        self.listeners, self.cut = replace(self.listeners, deadline=Deadline()), cut_by(end)
         found = self._best_so_far()
         if found is None and self.cut == "interrupted" and none_certified(self._table()) is None:
             raise end
@@ -181,14 +171,14 @@ class SynthesisRun:
 
     def _keep(self) -> None:
         """Tells what there is, as it would come out now."""
-        if self.kept is None:
+        if self.listeners.kept is None:
             return
         attempts, best = tuple(self.ladder.attempts), self._best_so_far()
         if self.last is None or (best, len(self.rows)) != self.known:
             self.known = best, len(self.rows)
             self.last = self._failed(tried(attempts)) if best is None else self._written(best)
         self.last = replace(self.last, attempts=attempts)
-        self.kept(self.last)
+        self.listeners.kept(self.last)
 
     # -- objectives ------------------------------------------------------------------------------------------------
 
@@ -277,7 +267,7 @@ class SynthesisRun:
             return row
         self._say(f"rate {near(metric.rate, 4)}: certifying")
         outputs = measured_in(self.spec, self.wanted.outputs)
-        return judged_row(row, self.ask(spec, self._judging(), self._watch, self.memory), outputs)
+        return judged_row(row, self._question(spec, self._judging()), outputs)
 
     def _judging(self) -> Options:
         """How closely a metric is judged that is to be compared."""
@@ -288,9 +278,8 @@ class SynthesisRun:
             metric=None,
         )
 
-    @property
-    def _watch(self) -> Progress:
-        return self.deadline.watched(self.progress)
+    def _question(self, spec: Spec, options: Options) -> Question:
+        return question_of(spec, options, self.listeners, self.memory)
 
     # -- outcomes ---------------------------------------------------------------------------------------------------
 
@@ -341,8 +330,8 @@ class SynthesisRun:
                 )
         if (failure := none_certified(self._table())) is not None:
             return self._none(failure)
-        if self.told is not None:
-            self.told(self._failed(tried(self.ladder.attempts)))
+        if self.listeners.told is not None:
+            self.listeners.told(self._failed(tried(self.ladder.attempts)))
         return self._failed(
             tried(self.ladder.attempts), *remedies(self.ladder, rate, self.wanted.degree, self._say)
         )
@@ -369,10 +358,7 @@ class SynthesisRun:
         judging = replace(self._judging(), epsilon=None, rho_a=None)
         for spec in otherwise(self.spec) if rows else ():
             self._say("trying another tube")
-            own = [
-                judged_row(row, self.ask(read_back(spec, row.metric), judging, self._watch, self.memory))
-                for row in rows
-            ]
+            own = [judged_row(row, self._question(read_back(spec, row.metric), judging)) for row in rows]
             best = min(
                 (row for row in own if row.counts), key=lambda row: row.score("adaptation"), default=None
             )
@@ -387,10 +373,8 @@ class SynthesisRun:
         self._tell(Step(phase=Phase.SYNTHESIS, name=words))
 
     def _tell(self, step: Step) -> None:
-        self.deadline.check()
-        if self.progress is not None:
-            self.said += 1
-            self.progress(replace(step, count=self.said, unit=Unit.STEPS))
+        self.said += 1
+        self.listeners(replace(step, count=self.said, unit=Unit.STEPS))
         if len(self.ladder.attempts) > self.noted:
             self.noted = len(self.ladder.attempts)
             self._keep()
