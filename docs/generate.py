@@ -21,11 +21,11 @@ from typing import Any, get_args
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from tubecert import records  # noqa: E402
-from tubecert.certificate.effective import Effective  # noqa: E402
+import forms  # noqa: E402
+
 from tubecert.enclosure.interval import Array  # noqa: E402
 from tubecert.expression import MAX_LENGTH, MAX_NAME_LENGTH  # noqa: E402
-from tubecert.records import refer  # noqa: E402
+from tubecert.records import members  # noqa: E402
 from tubecert.report import pages  # noqa: E402
 from tubecert.sampled_loop.record import FORMAT, Notes, Result  # noqa: E402
 from tubecert.spec.keys import LIST, NAME, NUMBER, PAIR, Section  # noqa: E402
@@ -322,9 +322,7 @@ def _of_source(source: str, group: list[dict[str, Any]]) -> str:
 
 def sampled_loop() -> dict[str, Any]:
     """The schema of certificates of sampled loops, from their records and the words of these."""
-    refer(Array, "matrix")
-    refer(Effective, "specification")
-    result, notes = (_described(records.schema(kind), kind) for kind in (Result, Notes))
+    result, notes = (_described(forms.schema(kind), kind) for kind in (Result, Notes))
     words = {
         "format": ({"const": FORMAT}, "Version of the format."),
         "hash": (
@@ -438,7 +436,7 @@ _MATRIX = "A matrix of floats (p, q) that are exact numbers: written as hexadeci
 def _described(form: dict[str, Any], kind: Any) -> dict[str, Any]:
     """A record's schema, closed, with the sentence of its words that names each key, or else all of them."""
     words = " ".join((kind.__doc__ or "").split())
-    hints = {item.name: hint for item, hint in records.members(kind)}
+    hints = {item.name: hint for item, hint in members(kind)}
     sentences = re.split(r"(?<=[.;]) ", words.replace("| None", ""))
     for key, value in form["properties"].items():
         inner = next(filter(is_dataclass, (hints[key], *get_args(hints[key]))), None)

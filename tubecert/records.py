@@ -132,16 +132,18 @@ def _record_json(record: Any) -> dict[str, Json]:
         value = getattr(record, item.name)
         if item.metadata.get("inline") or item.metadata.get("keyed"):
             data |= to_json(value)
-        elif _required(item) or value != _default(item):
+        elif required(item) or value != default(item):
             data[item.name] = to_json(value)
     return data
 
 
-def _required(item: Field[Any]) -> bool:
+def required(item: Field[Any]) -> bool:
+    """Whether a field is always written: it has no default."""
     return item.default is MISSING and item.default_factory is MISSING
 
 
-def _default(item: Field[Any]) -> Any:
+def default(item: Field[Any]) -> Any:
+    """What a field is where it is left out."""
     return item.default if item.default_factory is MISSING else item.default_factory()
 
 
@@ -245,7 +247,7 @@ def _record(kind: Any, data: dict[str, Json], path: str) -> Any:
             }
         elif item.name in left:
             values[item.name] = _read(hint, left.pop(item.name), f"{path}.{item.name}")
-        elif _required(item):
+        elif required(item):
             raise FormError(f"{path}.{item.name}", "is missing")
     if left and kind not in OPEN:
         raise FormError(f"{path}.{sorted(left)[0]}", "is not known")
@@ -271,76 +273,3 @@ def members(kind: Any) -> tuple[tuple[Field[Any], Any], ...]:
     """The fields of a record with their types."""
     hints = typing.get_type_hints(kind)
     return tuple((item, hints[item.name]) for item in fields(kind))
-
-
-# -- the form of it all, for JSON Schemas
-
-
-def schema(kind: Any) -> Json:
-    """The JSON Schema of the values of a type; a record is described by the first line of its docstring."""
-    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if origin in (Union, types.UnionType):
-        (inner,) = (each for each in arguments if each is not types.NoneType)
-        return {"anyOf": [schema(inner), {"type": "null"}]}
-    if kind in _REFERRED:
-        return {"$ref": f"#/$defs/{_REFERRED[kind]}"}
-    if origin is tuple and arguments[-1] is Ellipsis:
-        return {"type": "array", "items": schema(arguments[0])}
-    if origin is tuple:
-        return {"type": "array", "prefixItems": list(map(schema, arguments)), "minItems": len(arguments)}
-    if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):
-        return {"type": "object", "additionalProperties": schema(arguments[1])}
-    if origin is Literal:
-        return {"enum": list(arguments)}
-    if isinstance(kind, type) and issubclass(kind, Enum):
-        return {"enum": [member.value for member in kind]}
-    if isinstance(kind, type) and issubclass(kind, Tagged) and not kind.tag:
-        return {"anyOf": [_record_schema(member) for member in kind.family.values()]}
-    if is_dataclass(kind):
-        return _record_schema(kind)
-    return {"type": {str: "string", bool: "boolean", int: "integer", float: "number"}[kind]}
-
-
-_REFERRED: dict[Any, str] = {Fraction: "decimal"}  # types with a definition of their own
-
-
-def refer(kind: Any, name: str) -> None:
-    """Let schemas refer to a type by the name of its definition."""
-    _REFERRED[kind] = name
-
-
-def _record_schema(kind: Any) -> Json:
-    inlined = [hint for item, hint in members(kind) if item.metadata.get("inline")]
-    if inlined and issubclass(inlined[0], Tagged):
-        own = _own_schema(kind)
-        return {"anyOf": [_joined(_record_schema(each), own) for each in inlined[0].family.values()]}
-    return _own_schema(kind)
-
-
-def _own_schema(kind: Any) -> dict[str, Json]:
-    own = [(item, hint) for item, hint in members(kind) if not item.metadata]
-    properties = {item.name: schema(_written(item, hint)) for item, hint in own}
-    for item in fields(kind):
-        if kinds := item.metadata.get("keyed"):
-            properties |= {name: schema(each) for name, each in kinds().items()}
-    required = [item.name for item, _ in own if _required(item)]
-    if issubclass(kind, Tagged):
-        properties, required = {kind.key: {"const": kind.tag}, **properties}, [kind.key, *required]
-    words = " ".join((kind.__doc__ or "").partition("\n\n")[0].split())
-    found = {"type": "object", "description": words, "properties": properties, "required": required}
-    return found if required else {key: value for key, value in found.items() if key != "required"}
-
-
-def _written(item: Field[Any], hint: Any) -> Any:
-    """The type of a member where it is written: a None that is the default is left out."""
-    kinds = typing.get_args(hint)
-    left_out = not _required(item) and _default(item) is None and types.NoneType in kinds
-    return next(kind for kind in kinds if kind is not types.NoneType) if left_out else hint
-
-
-def _joined(one: dict[str, Json], other: dict[str, Json]) -> dict[str, Json]:
-    return {
-        **one,
-        "properties": {**one["properties"], **other["properties"]},
-        "required": [*one.get("required", ()), *other.get("required", ())],
-    }

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from tubecert.enclosure.constant import Constant, Witness
-from tubecert.records import FormError, Json, foreign, from_json, refer
+from tubecert.records import FormError, Json, foreign, from_json
 
 
 def _place_json(at: Witness) -> Json:
@@ -38,12 +38,4 @@ def _pair(data: Json, path: str) -> Constant:
 
 
 foreign(Witness, _place_json, _place)
-
-
 foreign(Constant, _pair_json, _pair)
-
-
-refer(Witness, "point")
-
-
-refer(Constant, "enclosure")
