@@ -298,9 +298,14 @@ class SynthesisRun:
 
     def _ended(self, verdict: Verdict) -> Synthesised:
         """A verdict, with what was tried."""
-        attempts = tuple(self.ladder.attempts)
         return Synthesised(
-            verdict=verdict, wanted=self.wanted, rows=self._table(), attempts=attempts, cut=self.cut
+            verdict=verdict,
+            objective=self.wanted.objective,
+            rate=self.wanted.rate,
+            wanted=self.wanted,
+            rows=self._table(),
+            attempts=tuple(self.ladder.attempts),
+            cut=self.cut,
         )
 
     def _table(self) -> tuple[Row, ...]:

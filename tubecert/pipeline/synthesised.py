@@ -14,7 +14,6 @@ from tubecert.certificate.effective import Asked
 from tubecert.certificate.result import (
     MetricFile,
     MetricRow,
-    RateLimits,
     SearchData,
     SolverData,
     SynthesisData,
@@ -22,12 +21,10 @@ from tubecert.certificate.result import (
 )
 from tubecert.certificate.sections import metric_data
 from tubecert.claims.advice import ConstantInputs, LowerDegree, MendPlan
-from tubecert.claims.failures import Attempt
-from tubecert.claims.family import Claim, Reason, Relax
+from tubecert.claims.family import Claim, Relax
 from tubecert.claims.statements import PlanBounded, PlanInSafeSet, StartInTube
 from tubecert.expression import to_text
 from tubecert.metric.verify import MetricProof
-from tubecert.pipeline.deadline import Cut
 from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
@@ -96,7 +93,7 @@ class Row(MetricRow):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Synthesised:
+class Synthesised(SearchData):
     """What became of a synthesis.
 
     `verdict`: certified (then `spec` has the metric and `file` is the metric file's content), refuted (no metric has
@@ -104,15 +101,10 @@ class Synthesised:
     `cut`: what ended the search before it was through, if anything did.
     """
 
-    verdict: Verdict
     wanted: Synthesis
     spec: Spec | None = None
     file: MetricFile | None = None
-    reason: Reason | None = None
     rows: tuple[Row, ...] = ()
-    attempts: tuple[Attempt, ...] = ()
-    limits: RateLimits | None = None
-    cut: Cut | None = None
 
     def data(self) -> SynthesisData:
         """`result.synthesis` of a certificate, with its notes."""
@@ -120,17 +112,10 @@ class Synthesised:
 
     def search(self) -> SearchData:
         """What was tried; no times."""
-        return SearchData(
-            objective=self.wanted.objective,
-            verdict=self.verdict,
-            attempts=self.attempts,
-            rate=self.wanted.rate,
-            table=tuple(row.data() for row in self.rows),
-            limits=self.limits,
-            cut=self.cut,
-            solver=None if self.file is None else self.file.solver,
-            reason=self.reason,
-        )
+        found = {item.name: getattr(self, item.name) for item in fields(SearchData)}
+        found["table"] = tuple(row.data() for row in self.rows)
+        found["solver"] = None if self.file is None else self.file.solver
+        return SearchData(**found)
 
 
 class TooLongError(Exception):
