@@ -16,8 +16,12 @@ def plant(A, B, *, H=None, E=None, rho=None, **given):
     sizes |= {"room": m, "wishes": n, "space": n}
     usual = {"room": np.inf, "wishes": np.inf, "space": np.inf}
     arrays = {name: np.zeros(size) + given.pop(name, usual.get(name, 0.0)) for name, size in sizes.items()}
+    E = E * arrays.pop("wind")
+    units = tuple(np.ones(size) for size in (n, m, r))
     rest = {"sample_time": 1.0, "delay": 0.0, "noise_ball": False, "wind_ball": False} | given
-    return Plant(A=A, B=B, H=H, E=E, remainder=rho or (lambda W, U: np.zeros(n + m)), **arrays, **rest)
+    return Plant(
+        A=A, B=B, H=H, E=E, units=units, remainder=rho or (lambda W, U: np.zeros(n + m)), **arrays, **rest
+    )
 
 
 def scalar(noise, **given):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from plants import double, plant, pvtol, scalar
 
-from tubecert.loop_design.certification import certify
-from tubecert.loop_design.design import _Search, design
-from tubecert.loop_design.observer import in_units, observe, units_of
-from tubecert.loop_design.unfound import NoDesign
+from tubecert.loop_design.certification import ask, certify
+from tubecert.loop_design.design import NoDesign, _Search, design
+from tubecert.loop_design.observer import observe
+from tubecert.loop_design.plant import in_units, plant_of
 from tubecert.spec import load, load_text
 from tubecert.spec.override import Setting
 
@@ -140,7 +140,7 @@ limits: {u: [-20, 20]}
 def test_a_tube_that_is_wider_than_the_safe_set_meets_no_wish(bent, meets):
     """Without wishes as well: the search starts again then, which a drone of a mass known to 5 % needs."""
     machine = double(rho=lambda W, U: np.array([0.0, bent * W[0], 0.0]), space=100.0)
-    search = _Search(observe(in_units(machine, units_of(machine))), lambda *_: None)
+    search = _Search(observe(in_units(machine)), lambda *_: None)
     assert search.meets_wishes(search.within()) == meets
 
 
@@ -216,3 +216,31 @@ def test_without_a_controller_the_mode_that_grows_is_named():
     )
     (lack,) = certify(load_text(text)).result.lacks
     assert (lack.kind, lack.where, lack.needed) == ("no_design", "x", pytest.approx(2))
+
+
+@pytest.mark.slow
+def test_a_drone_whose_mass_is_hardly_known_keeps_a_tube_without_a_wish():
+    """Nothing moves its angle but its own inputs: a loop that hears nothing would be narrow, but never closes."""
+    text = """tubecert: 1
+name: drone
+system:
+  states: [px, pz, phi, vx, vz, w]
+  inputs: [F, M]
+  parameters: {m: [0.475, 0.525], J: 0.004, g: 9.81}
+  f: [vx, vz, w, 0, -g, 0]
+  B: [[0, 0], [0, 0], [0, 0], [-sin(phi)/m, 0], [cos(phi)/m, 0], [0, 1/J]]
+safe_set: {px: [-3, 3], pz: [-3, 3], phi: [-0.7, 0.7], vx: [-3, 3], vz: [-3, 3], w: [-6, 6]}
+trajectory: {kind: equilibrium, at: [0, 0, 0, 0, 0, 0], input: [0.5*g, 0]}
+limits: {F: [0, 10], M: [-0.3, 0.3]}
+hardware: {rate: 250, delay: 0.004, noise: {px: 0.002, pz: 0.002, phi: 0.002, vx: 0.01, vz: 0.01, w: 0.01}}
+"""
+    spec = load_text(text, "drone.yaml")
+    found = design(plant_of(ask(spec), np.ones(2)))
+    assert found.evaluations < 700
+    assert (found.W < [0.1, 0.03, 0.03, 0.15, 0.1, 0.2]).all()
+    assert certify(spec).result.verdict == "certified"
+
+
+def test_an_input_whose_plan_is_at_its_limit_is_told_without_numbers():
+    found = refused(scalar(0.1, room=[0.0]))
+    assert (found.kind, found.where, found.needed) == ("inputs", 0, None)

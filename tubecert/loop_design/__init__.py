@@ -5,10 +5,9 @@ whatever is proposed here, the theorem in `sampled_loop` decides. Deterministic:
 
 | module | holds |
 |---|---|
-| `plant` | the error equation and the size of all that acts on it |
+| `plant` | the error equation and the size of all that acts on it, in units of its own |
 | `widths` | how far a loop can be driven: exact sums over lags, and their fixed point with the remainder |
 | `observer` | weights -> tables, by two Riccati equations |
-| `design` | the search for the weights |
-| `unfound` | why nothing was found |
-| `proposal` | tables -> stages and a recipe for the theorem |
+| `design` | the search for the weights; why nothing was found |
+| `proposal` | tables -> stages and a recipe for the theorem, and what fills them |
 """

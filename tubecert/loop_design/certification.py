@@ -20,11 +20,9 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.expression.matrix import identity
-from tubecert.loop_design.design import Design, design
+from tubecert.loop_design.design import Design, NoDesign, design, refuse_unmoved
 from tubecert.loop_design.plant import plant_of, space_of
-from tubecert.loop_design.proposal import propose
-from tubecert.loop_design.shares import explain
-from tubecert.loop_design.unfound import NoDesign, refuse_unmoved
+from tubecert.loop_design.proposal import explain, propose
 from tubecert.model import ControlAffineModel, build
 from tubecert.planner import propose as planner
 from tubecert.progress import Phase, Progress, Step, Unit

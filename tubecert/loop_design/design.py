@@ -1,36 +1,38 @@
-"""The search for the weights whose tables keep the tube small, and the tables.
+"""The search for the weights whose tables keep the tube small, and the tables; or why none were found.
 
 In: a plant. Out: a `Design`. A pattern search on the logarithms of all weights, first for the geometric mean of the
 widths without remainders, which needs no reference, then for the largest of the fixed point's widths with them,
-relative to the first or to what is wished. Trusted: no.
+relative to the first or to what is wished. Trusted: no; nothing is proven by what is said to be missing either.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from scipy.linalg import null_space, orth
 
 from tubecert.enclosure.interval import Array
-from tubecert.loop_design import unfound
-from tubecert.loop_design.observer import Observer, in_units, observe, rounded, units_of
-from tubecert.loop_design.plant import Plant
-from tubecert.loop_design.unfound import NoDesign
-from tubecert.loop_design.widths import Response, respond, rest_at, sample_of, settle, sizes
+from tubecert.loop_design.observer import Observer, observe
+from tubecert.loop_design.plant import Plant, in_units
+from tubecert.loop_design.widths import STILL, Response, respond, rest_at, settle, spread
 from tubecert.sampled_loop.record import Tables
 
 COARSE = (10.0, 3.0)  # factors on groups of weights
 FINE = (3.0, 1.7, 3.0, 1.7, 1.3)  # on groups and on single weights
 GAIN = 1e-3  # what a step must gain
-STEPS = 8  # of the fixed point in a search
+STEPS, MANY = 24, 400  # of the fixed point in a search, and at the end
 SPARE = 1.1  # times the remainder has a fixed point there: a proof does not find those that barely exist
-SEARCHED, SUMMED = 3000, 20_000  # lags in a search, and at the end
-UNSTABLE = 1e9
+UNSTABLE, OPEN = 1e9, 1e3  # what loops count that are not stable, or have no tube
 ROOM = 0.95  # of an input may be used without a price: rigorous bounds are a little wider
 FREE = 0.05  # what an input that nothing limits counts, beside the widths
 SLOW = 0.03  # what lags count: twice as many must make the tube 2 % smaller
+LONG = 3000  # lags, and more cost in proportion: they take long to prove
+SEEN = 2.0  # times the noise of a state: to know it better than that is worth nothing
 LATER = 1.0  # what the long run counts beside the tube for ever, where the start makes them differ
+GROWN = 10.0  # times its width without remainders is the most that a state is compared with
 WISH = 0.9  # of a half-width that is wished is aimed at
 UNASKED = 2.0  # times its first half-width is what a state may have for another one's wish
 
@@ -45,52 +47,102 @@ class Design:
     evaluations: int
 
 
+@dataclass(eq=False)
+class NoDesign(Exception):  # noqa: N818 -- an answer, not a fault
+    """No tables keep a tube, or none were found.
+
+    "no_design": no input moves a mode that does not die away, `where` the state in which it shows most, `needed` its
+    growth in 1/s; without `where`, no stable loop was found. "inputs": input `where` needs that much of what is
+    allowed. "no_fixed_point": state `where` grows past `needed`, `allowed` it would have without remainders.
+    """
+
+    kind: Literal["no_design", "inputs", "no_fixed_point"]
+    where: int | None = None
+    needed: float | None = None
+    allowed: float | None = None
+
+
 def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> Design:
     """The tables with the smallest tube that the search has found; `report` is told evaluations and the best value.
 
     Raises `NoDesign` where a mode cannot be moved or held, or where the best loop found needs more input than there
     is, or has no tube.
     """
-    unfound.refuse_inputs(plant, np.full_like(plant.room, 1e-300))
-    with np.errstate(all="ignore"):
-        units = units_of(plant)
-    if not np.isfinite(np.concatenate(units)).all():  # too much happens within a sample
+    if not (plant.room > 0).all():
+        raise NoDesign("inputs", int(np.argmin(plant.room)))
+    _refuse_unheld(plant)
+    own = in_units(plant)
+    s, u, _ = own.units
+    if not np.isfinite(np.concatenate(own.units)).all():  # too much happens within a sample
         raise NoDesign("no_design")
-    observer = observe(in_units(plant, units))
-    unfound.refuse_unmoved(observer.plant.A, observer.plant.B)
-    unfound.refuse_unheld(plant)
-    search = _Search(observer, report or (lambda evaluations, value: None))
-    weights = search.run(search.within())
-    if search.refer(weights):
-        weights = search.run(weights)
-        if not search.meets_wishes(weights):
-            weights = min(weights, search.run(search.within()), key=search.value)
-        if np.isfinite(plant.wishes).any() and search.meets_wishes(weights):
-            weights = search.narrowed(weights)
-    if (found := observer.table(weights)) is None:
+    refuse_unmoved(own.A, own.B)
+    search = _Search(observe(own), report or (lambda evaluations, value: None))
+    weights = search.found()
+    if (reached := search.response(weights)) is None:
         raise NoDesign("no_design")
-    (n, m), theta = plant.B.shape, rounded(observer, found, units)
-    tables = Tables(theta[m:, n:], theta[m:, :n], theta[:m, n:], theta[:m, :n])
-    return Design(tables, *_tube(plant, theta), evaluations=search.evaluations)
+    theta, response = reached
+    alone = response.ever + response.gain @ search.constant
+    _refuse_inputs(plant, alone[len(s) :] * u)
+    size, moved = settle(own, response.gain, response.ever, MANY)
+    (W, U), first = np.split(size * np.r_[s, u], [len(s)]), alone[: len(s)] * s
+    if (
+        moved > STILL and not plant.start.any()
+    ):  # one that falls after a start has a smaller remainder than at first
+        worst = int(np.argmax(W / first))
+        raise NoDesign("no_fixed_point", worst, float(W[worst]), float(first[worst]))
+    (n, m), table = plant.B.shape, search.observer.rounded(theta)
+    tables = Tables(table[m:, n:], table[m:, :n], table[:m, n:], table[:m, :n])
+    return Design(tables, np.maximum(W, plant.start), U, evaluations=search.evaluations)
 
 
-def _tube(plant: Plant, theta: Array) -> tuple[Array, Array]:
-    """W, U of rounded tables by the fixed point, followed to its end; or `NoDesign`.
+def refuse_unmoved(A: Array, B: Array) -> None:
+    """Modes outside of all that the inputs reach must die away by themselves; in units of order one."""
+    reached = B
+    for _ in A:
+        reached = orth(np.hstack([reached, A @ reached]), rcond=1e-9)
+    rest = null_space(reached.T)
+    inner = rest.T @ A @ rest
+    for growth, mode in zip(*np.linalg.eig(inner.T), strict=True):
+        if growth.real > -1e-6 * np.abs(inner).max():
+            raise NoDesign("no_design", int(np.argmax(np.abs(rest @ mode))), float(growth.real))
 
-    A tube that falls after a start has a smaller remainder than one of its first size: with a start, none is refused.
+
+def _refuse_unheld(plant: Plant) -> None:
+    """A real mode z = l'e that grows must be held against eta and wind, as large as it is when an input can answer.
+
+    z' = g z + l'(B delta + H eta + E w): no controller, linear or not, does with less.
     """
-    n, m = plant.B.shape
-    if (response := respond(plant, sample_of(plant), theta, SUMMED)) is None:
-        raise NoDesign("no_design")
-    alone = sizes(plant, response.ever + response.gain @ rest_at(plant, np.zeros(n + m)))
-    unfound.refuse_inputs(plant, alone[n:])
-    size, settled = settle(plant, response.gain, response.ever, 400)
-    if not plant.start.any():
-        if not settled:
-            worst = int(np.argmax(size[:n] / alone[:n]))
-            raise NoDesign("no_fixed_point", worst, float(size[worst]), float(alone[worst]))
-        unfound.refuse_inputs(plant, size[n:])
-    return np.maximum(size[:n], plant.start), size[n:]
+    growths, modes = np.linalg.eig(plant.A.T)
+    for growth, left in zip(growths, modes.T, strict=True):
+        if growth.imag == 0 and growth.real > 1e-9 * np.abs(plant.A).max():
+            wind = np.linalg.norm(left @ plant.E, 2 if plant.wind_ball else 1)
+            pushed = wind + np.abs(left @ plant.H) @ plant.magnitude
+            needed = pushed * np.exp(growth.real * (plant.sample_time + plant.delay))
+            moved = np.abs(left @ plant.B)
+            strength = moved[moved > 0] @ plant.room[moved > 0]
+            if needed > strength:
+                j = int(np.argmax(moved))
+                raise NoDesign("inputs", j, float(plant.room[j] * needed / strength), float(plant.room[j]))
+
+
+def _refuse_inputs(plant: Plant, U: Array) -> None:
+    """Every input must be within its room."""
+    j = int(np.argmax(U - plant.room))
+    if U[j] > plant.room[j]:
+        raise NoDesign("inputs", j, float(U[j]), float(plant.room[j]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reached:
+    """How far a loop is driven: W for ever and in the long run (2, n), U (m,).
+
+    `grows`: by which factor what is not linear widens a tube ever more; 0 where it may close.
+    """
+
+    lags: float
+    W: Array
+    U: Array
+    grows: float = 0.0
 
 
 class _Search:
@@ -103,81 +155,96 @@ class _Search:
         self.n = len(plant.A)
         self.constant = rest_at(plant, np.zeros(sum(plant.B.shape)))
         self.counts = np.array([1.0, LATER if plant.start.any() or plant.eta_start.any() else 0.0]) / self.n
+        self.least = np.maximum(SEEN * plant.noise, 1e-30)
         self.reference: Array | None = None
         self.most = np.full((0, self.n), np.inf)  # of W for ever, once wishes are met
         sorts, many = np.repeat(range(6), observer.sizes()), np.repeat(observer.sizes(), observer.sizes())
         self.groups = np.array([1.0 * (sorts == sort) for sort in (1, 2, 3, 4)])
         self.singles = np.eye(len(sorts))[(many > 1) | (sorts == 0) | (sorts == 5)]
 
-    def _reach(self, weights: Array, steps: int) -> tuple[Response, Array, Array] | None:
-        """The response, W for ever and in the long run (2, n), and U; without `steps`, no remainder grows.
-
-        A tube falls after a start: for ever it has half the remainder of its beginning, half that of its long run.
-        """
-        self.evaluations += 1
-        theta, plant = self.observer.table(weights), self.plant
-        if theta is None or not (response := respond(plant, self.observer.sample, theta, SEARCHED)):
-            return None
-        gain, added = (
-            (SPARE * response.gain, 0.0) if steps else (0.0 * response.gain, response.gain @ self.constant)
-        )
-        late = settle(plant, gain, response.long_run + added, steps)[0]
-        rest = rest_at(plant, late)
-        first = sizes(plant, response.ever + added + gain @ rest)
-        ever = sizes(plant, response.ever + added + gain @ (0.5 * rest + 0.5 * rest_at(plant, first)))
-        return response, np.array([ever, late])[:, : self.n], ever[self.n :]
-
-    def value(self, weights: Array) -> float:
-        """What the search makes small.
-
-        The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs or the
-        tube leave their room, or inputs cost nothing, and for loops that forget slowly.
-        """
-        steps = STEPS if self.reference is not None or len(self.most) else 0
-        if (reached := self._reach(weights, steps)) is None:
-            return UNSTABLE
-        response, W, U = reached
-        if self.reference is None:
-            value = np.exp(self.counts @ np.log(np.maximum(W, 1e-30)).sum(axis=1))
-        else:
-            value = (self.counts @ ((W / self.reference) ** 8).sum(axis=1)) ** (1 / 8)
-        parts = U / self.plant.room, W[0] / self.plant.space, (W[0] / self.most).ravel()
-        over = np.maximum(0.0, np.concatenate(parts) - ROOM)
-        free = np.where(np.isinf(self.plant.room), U, 1.0)
-        return float(value * (1 + 5 * over + 50 * over**2).prod() * free.prod() ** FREE * response.lags**SLOW)
+    def found(self) -> Array:
+        """The best weights: without remainders, with them, and where wishes are met still narrower."""
+        weights, wished = self.run(self.within()), np.isfinite(self.plant.wishes)
+        alone, grown = self.reach(weights), self.reach(weights, STEPS)
+        if alone is None or grown is None or not (wished.any() or (grown.W > (1 + 1e-4) * alone.W).any()):
+            return weights
+        first = np.minimum(grown.W, GROWN * alone.W) * (UNASKED if wished.any() else 1.0)
+        self.reference = np.maximum(first, self.least)
+        self.reference[:, wished] = WISH * self.plant.wishes[wished]
+        weights = self.run(weights)
+        if not self.meets_wishes(weights):
+            weights = min(weights, self.run(self.within()), key=self.value)
+        if not wished.any() or not self.meets_wishes(weights):
+            return weights
+        self.reference, self.most = None, self.plant.wishes[None]
+        return self.run(weights, FINE[1:2])
 
     def within(self) -> Array:
         """First weights: inputs grow dear, and eta slow, until no input leaves its room."""
         weights = np.zeros(self.groups.shape[1])
         for _ in range(8):
-            reached = self._reach(weights, 0)
-            if reached and (reached[2] <= self.plant.room).all():
+            reached = self.reach(weights)
+            if reached and (self.plant.room >= reached.U).all():
                 break
             weights = weights + np.log(10) * np.array([1, 1, -1, 0]) @ self.groups
         return weights
 
-    def refer(self, weights: Array) -> bool:
-        """Take these weights' widths, or wishes, as the reference; whether that makes any difference."""
-        alone, grown = self._reach(weights, 0), self._reach(weights, STEPS)
-        if alone is None or grown is None:
-            return False
-        wished = np.isfinite(self.plant.wishes)
-        grows = any((more > (1 + 1e-4) * less).any() for less, more in zip(alone[1:], grown[1:], strict=True))
-        self.reference = np.minimum(grown[1], 1e3 * alone[1]) * (UNASKED if wished.any() else 1.0)
-        self.reference[:, wished] = WISH * self.plant.wishes[wished]
-        return bool(wished.any() or grows)
-
     def meets_wishes(self, weights: Array) -> bool:
         """Whether the tube of these weights is as narrow as wished, and not wider than the safe set."""
-        reached = self._reach(weights, STEPS)
-        return reached is not None and bool(
-            (reached[1] <= np.minimum(self.plant.wishes, self.plant.space)).all()
-        )
+        reached, most = self.reach(weights, STEPS), np.minimum(self.plant.wishes, self.plant.space)
+        return reached is not None and not reached.grows and bool((most >= reached.W).all())
 
-    def narrowed(self, weights: Array) -> Array:
-        """From weights that meet the wishes on to narrower tubes that meet them as well."""
-        self.reference, self.most = None, self.plant.wishes[None]
-        return self.run(weights, FINE[1:2])
+    def response(self, weights: Array) -> tuple[Array, Response] | None:
+        """Theta of these weights and what it answers; None if the loop is not stable."""
+        self.evaluations += 1
+        theta = self.observer.table(weights)
+        response = None if theta is None else respond(self.plant, self.observer.sample, theta)
+        return None if theta is None or response is None else (theta, response)
+
+    def reach(self, weights: Array, steps: int = 0) -> _Reached | None:
+        """How far the loop of these weights is driven; without `steps` no remainder grows.
+
+        A tube falls after a start: for ever it has half the remainder of its beginning, half that of its long run.
+        """
+        if (found := self.response(weights)) is None:
+            return None
+        response, plant, n = found[1], self.plant, self.n
+        alone, late = (rows + response.gain @ self.constant for rows in (response.ever, response.long_run))
+        if not steps:
+            return _Reached(response.lags, np.array([alone, late])[:, :n], alone[n:])
+        gain = SPARE * response.gain
+        late, moved = settle(plant, gain, response.long_run, steps)
+        if not np.isfinite(moved):
+            return _Reached(
+                response.lags, np.array([late, late])[:, :n], alone[n:], spread(plant, gain, alone)
+            )
+        rest = rest_at(plant, late)
+        first = response.ever + gain @ rest
+        ever = response.ever + gain @ (0.5 * rest + 0.5 * rest_at(plant, first))
+        return _Reached(response.lags, np.array([ever, late])[:, :n], ever[n:])
+
+    def value(self, weights: Array) -> float:
+        """What the search makes small, a logarithm.
+
+        The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs or the
+        tube leave their room, or inputs cost nothing, and for loops that forget slowly. Where no tube closes, by which
+        factor it grows.
+        """
+        steps = STEPS if self.reference is not None or len(self.most) else 0
+        if (reached := self.reach(weights, steps)) is None:
+            return UNSTABLE
+        W, plant = reached.W, self.plant
+        used = [reached.U / plant.room, W[0] / plant.space, (W[0] / self.most).ravel()]
+        if reached.grows:
+            value, used = OPEN + np.log(reached.grows), used[:1]
+        elif self.reference is None:
+            value = self.counts @ np.log(np.maximum(W, self.least)).sum(axis=1)
+        else:
+            value = np.log(self.counts @ ((W / self.reference) ** 8).sum(axis=1)) / 8
+        over = np.maximum(0.0, np.concatenate(used) - ROOM)
+        free = FREE * np.log(np.maximum(reached.U[np.isinf(plant.room)], 1e-9)).sum()
+        forgets = SLOW * np.log(reached.lags) + np.log(max(1.0, reached.lags / LONG))
+        return float(value + np.log1p(5 * over + 50 * over**2).sum() + free + forgets)
 
     def run(self, weights: Array, fine: Sequence[float] = FINE) -> Array:
         """Along every direction while that gains, then along the whole sweep once more."""
@@ -195,7 +262,7 @@ class _Search:
         return weights
 
     def _along(self, move: Array, weights: Array, best: float) -> tuple[Array, float]:
-        while move.any() and (value := self.value(weights + move)) < best * (1 - GAIN):
+        while move.any() and (value := self.value(weights + move)) < best - GAIN:
             weights, best = weights + move, value
             self.report(self.evaluations, best)
         return weights, best
