@@ -244,3 +244,23 @@ hardware: {rate: 250, delay: 0.004, noise: {px: 0.002, pz: 0.002, phi: 0.002, vx
 def test_an_input_whose_plan_is_at_its_limit_is_told_without_numbers():
     found = refused(scalar(0.1, room=[0.0]))
     assert (found.kind, found.where, found.needed) == ("inputs", 0, None)
+
+
+@pytest.mark.parametrize(("growth", "held", "room", "told"), [
+    (-0.5, 0.4, 3, "input: [0.5]"),
+    (-0.5, 0.5, 3, None),
+    (0.5, -0.4, 0.01, "input: [-0.5]"),
+])  # fmt: skip
+def test_what_would_hold_a_plan_that_is_no_equilibrium_is_told(growth, held, room, told):
+    """Whether a tube is proven or none is found."""
+    text = f"""tubecert: 1
+name: tank
+system: {{states: [x], inputs: [u], f: ["{growth}*x"], B: [[1]]}}
+safe_set: {{x: [-5, 5]}}
+trajectory: {{kind: equilibrium, at: [1], input: [{held}]}}
+hardware: {{rate: 10, noise: {{x: 0.05}}}}
+limits: {{u: [{held - room}, {held + room}]}}
+"""
+    found = certify(load_text(text, "tank.yaml"))
+    assert (found.result.verdict == "certified") == (room > 1)
+    assert found.notes.missed == told

@@ -165,6 +165,18 @@ def test_degrees_are_shown_as_degrees():
     assert "p (rad)     0.1321    0.034       0.174533" in text
 
 
+@pytest.mark.parametrize(("missed", "told"), [
+    ("input: [2]", "it is no equilibrium: input: [2] is"),
+    ("", "it misses its own equations: tubecert check says where"),
+])  # fmt: skip
+def test_a_plan_that_misses_its_own_equations_is_told_on_the_first_screen(missed, told):
+    certificate = sampled.certificate()
+    assert "plan  " not in shown(certificate)
+    text = shown(replace(certificate, notes=replace(certificate.notes, missed=missed)))
+    assert f"  plan        {told}" in text
+    assert len(text.splitlines()) <= 15
+
+
 def figures_of(page):
     (section,) = (section for section in page.sections if section.key == "figures")
     return {figure.key: figure for figure in section.blocks[0].figures}

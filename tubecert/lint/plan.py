@@ -183,7 +183,7 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
-        near_by = _equilibrium(spec)
+        near_by = held_by(spec)
         message = f"|f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)"
         if notable:
             message = f"the point is no equilibrium: {message}"
@@ -205,7 +205,7 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
         yield finding(spec, codes.PLAN_DEFECT, "trajectory.u", message, help)
 
 
-def _equilibrium(spec: Spec) -> str:
+def held_by(spec: Spec) -> str:
     """What to write for the equilibrium near the point that is held; empty if none is found in the safe set."""
     plan = spec.trajectory
     x, u = (tuple(term.expression.fraction for term in terms) for terms in (plan.x, plan.u))

@@ -22,7 +22,7 @@ from tubecert.errors import SpecError
 from tubecert.expression.matrix import identity
 from tubecert.loop_design.design import Design, NoDesign, design, refuse_unmoved
 from tubecert.loop_design.plant import plant_of, space_of
-from tubecert.loop_design.proposal import explain, propose
+from tubecert.loop_design.proposal import explain, fitting, propose
 from tubecert.model import ControlAffineModel, build
 from tubecert.planner import propose as planner
 from tubecert.progress import Phase, Progress, Step, Unit
@@ -35,6 +35,7 @@ from tubecert.trajectory.make import Room, plan_of
 from tubecert.verdict import Verdict
 
 _WINDOWS: Final = 256
+_DEFECT: Final = 1e-6  # of the safe set in a second: what of a plan's defect is of rounding alone
 _TRIES: Final = 4  # designs with ever less room, where a proof needs more than floats
 
 
@@ -84,7 +85,7 @@ def _knots(spec: Spec, model: ControlAffineModel, report: Progress | None) -> Kn
 
 def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, Notes]:
     """Tables, stages and what is proven of them; with less room for the inputs where the proof finds too little."""
-    loop, notes = remainders.loop, Notes()
+    loop = remainders.loop
     plain, narrow = _result(loop), np.ones(loop.inputs)
     for _ in range(_TRIES):
         try:
@@ -94,7 +95,8 @@ def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, No
             names = loop.model.inputs if error.kind == "inputs" else loop.model.states
             where = "" if error.where is None else names[error.where]
             lack = Lack(kind=error.kind, where=where, needed=error.needed, allowed=error.allowed)
-            return replace(plain, lacks=(lack,)), notes
+            missed = (remainders.defect > _DEFECT * space_of(remainders)).any()
+            return replace(plain, lacks=(lack,)), Notes(missed=fitting(loop) if missed else None)
         checked = check(loop, found.tables, stages, inequalities.recipe)
         notes = explain(inequalities, stages, found.evaluations)
         over = {lack.where: lack for lack in checked.lacks if lack.kind == "inputs"}

@@ -14,6 +14,7 @@ import numpy as np
 
 from tubecert.digits import up
 from tubecert.enclosure.interval import Array
+from tubecert.lint.plan import held_by
 from tubecert.loop_design.design import NoDesign
 from tubecert.sampled_loop.matrices import total
 from tubecert.sampled_loop.record import Notes, Recipe, Shares, Stage, Tables
@@ -34,6 +35,7 @@ _STAGES: Final = (32, 8, 3, 1)
 _WIDER: Final = 1 + 1e-3  # what another arithmetic finds has to be inside as well
 _INSIDE: Final = 1 - 1e-5
 _DIGITS: Final = 7
+_NOTABLE: Final = 0.01  # of a half-width: what a plan's own defect may fill without a word
 _POINTS: Final = 401  # of the plan, to be drawn
 
 Report = Callable[[int, Array], None]
@@ -163,18 +165,29 @@ def _stages(loop: Loop, boxes: Boxes, starts: Sequence[int]) -> tuple[Stage, ...
 
 def explain(inequalities: Inequalities, stages: Sequence[Stage], evaluations: int) -> Notes:
     """Shares of the first and the last stage and of the inputs, and points of the plan."""
-    model = inequalities.loop.model
+    loop, model = inequalities.loop, inequalities.loop.model
     boxes = Boxes.of(stages, model, above=True)
     with np.errstate(all="ignore"):
         first, last = (_causes(inequalities, boxes, stage) for stage in (0, len(stages) - 1))
-    n = len(model.states)
+    n, responses, missed = loop.states, inequalities.responses, np.zeros(inequalities.responses.passing)
+    missed[-n - loop.inputs : -loop.inputs] = inequalities.remainders.defect
+    every = responses.past[-1, n * (len(responses.nodes) - 1) :][:n] + responses.direct[-1, :, : len(missed)]
+    widened = total(every, missed) / boxes.W.max(axis=0)
     return replace(
-        _points(inequalities.loop.plan),
+        _points(loop.plan),
+        missed=fitting(loop) if (widened > _NOTABLE).any() else None,
         start=dict(zip(model.states, first, strict=False)),
         long_run=dict(zip(model.states, last, strict=False)),
         deviations=dict(zip(model.inputs, first[n:], strict=False)),
         evaluations=evaluations,
     )
+
+
+def fitting(loop: Loop) -> str | None:
+    """What to write for a plan at rest that misses its own equations, empty for others; None for a family."""
+    if loop.plan.allowance is not None:
+        return None
+    return held_by(loop.spec) if loop.spec.trajectory.kind == "equilibrium" else ""
 
 
 def _causes(inequalities: Inequalities, boxes: Boxes, stage: int) -> list[Shares]:

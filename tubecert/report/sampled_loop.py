@@ -26,6 +26,7 @@ from tubecert.words.sampled_loop import (
     filling,
     is_alone,
     loop,
+    misses,
     plan,
     promise,
     remedy,
@@ -96,7 +97,8 @@ def _screen(result: Result, notes: Notes) -> Iterator[Block]:
         yield _widths(result, _first(result))
     proven = result.verdict is Verdict.CERTIFIED
     told = (*_inputs(result), *_worst(result, notes), *_obstacles(result)) if proven else ()
-    if rows := [*told, *_lacking(result, notes)]:
+    missed = [] if notes.missed is None else [("plan", misses(notes.missed))]
+    if rows := [*told, *missed, *_lacking(result, notes)]:
         yield Facts.of(
             rows, tuple(name for name, _ in rows if name.startswith("fills") or name == "obstacles")
         )

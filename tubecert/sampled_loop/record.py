@@ -217,6 +217,8 @@ class Notes:
 
     `start` and `long_run`: what fills each half-width in the first and in the last stage; `deviations`: each input.
     `samples_t`, `samples_x` and `samples_u` are points of the plan, to be drawn.
+    `missed`: of a plan that misses its own equations, where that widens the tube, what would hold it if it is at rest,
+    empty where nothing is known to.
     `evaluations`: how many controllers were tried.
     """
 
@@ -226,6 +228,7 @@ class Notes:
     samples_t: tuple[float, ...] = ()
     samples_x: tuple[tuple[float, ...], ...] = ()
     samples_u: tuple[tuple[float, ...], ...] = ()
+    missed: str | None = None
     evaluations: int = 0
 
     @property

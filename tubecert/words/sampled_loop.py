@@ -78,6 +78,15 @@ def plan(result: Result) -> str:
     return "every plan of the family" if result.spec.effective.trajectory.kind == "any" else "the plan"
 
 
+def misses(fitting: str) -> str:
+    """That the plan does not solve its own equations, and what would."""
+    return (
+        f"it is no equilibrium: {fitting} is"
+        if fitting
+        else "it misses its own equations: tubecert check says where"
+    )
+
+
 def extent(result: Result) -> str:
     """The time that is claimed."""
     claim, last = result.claim, result.spec.effective.trajectory.horizon
