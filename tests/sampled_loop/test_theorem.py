@@ -177,6 +177,13 @@ def test_a_start_has_signs_a_box_has_none_and_a_ball_its_length():
         close(asked(loop, controller_of([[3, 4]])).first(np.arange(2))[0, -1], size)
 
 
+def test_a_start_lasts_up_to_the_last_lag():
+    """e_(k+1) = e_k/2 under delta = -5 e."""
+    first = asked(loop_of(initial_state="{at: [1]}"), controller_of([[-5]]), lags=2).first(np.arange(4))
+    close(first[:3, -1], [5, 2.5, 1.25], 1e-6)
+    assert first[3, -1] == 0
+
+
 def test_tail():
     """e_(k+1) = e_k/2 + what wind adds: three lags, and an eighth of the box."""
     loop = loop_of(disturbance="{E: [[1]], bound: 0.3}")
@@ -572,7 +579,8 @@ def test_the_state_that_is_too_wide_is_named_and_inputs_are_those_of_the_widest_
 @pytest.mark.parametrize(("ends", "lacks"), [("[-1.6, 3]", []), ("[-1.6, 1.4]", ["x"]), ("[-1.4, 3]", ["x"])])
 def test_a_tube_keeps_to_both_ends_of_the_safe_set(ends, lacks):
     found = judged(loop_of(safe_set=f"{{x: {ends}}}", trajectory=WAVE), controller_of(), (0, [0.5], 9))
-    assert [lack.where for lack in found.lacks if lack.kind == "safe_set"] == lacks
+    over = [(lack.where, lack.needed) for lack in found.lacks if lack.kind == "safe_set"]
+    assert over == [(name, pytest.approx(0.1, rel=0.05)) for name in lacks]
 
 
 @pytest.mark.parametrize(("entry", "verdict"), [(-10, "certified"), (-10.1, "undecided")])
@@ -584,6 +592,28 @@ def test_cuts_are_lags():
     loop = loop_of(uncertainty="{h: ['0.1*sin(t)']}")
     for cut, verdict in ((-1, "undecided"), (0, "certified"), (6, "undecided")):
         assert judged(loop, controller_of(), (0, [1], 9), cut=cut).verdict.value == verdict
+    recipe = asked(loop, cut=0).recipe
+    one = Stage(start=0, half_widths={"x": Fraction(1)}, deviations={"u": Fraction(9)}, memory=())
+    for cuts, verdict in (
+        (((0,), (0,)), "certified"),
+        (((0,), (6,)), "undecided"),
+        (((-1,), (0,)), "undecided"),
+    ):
+        found = check(loop, controller_of(), [one], replace(recipe, cuts=cuts))
+        assert found.verdict.value == verdict
+
+
+def test_every_stage_has_samples_of_its_own():
+    stages = (0, [1], 9), (3, [1], 9), (3, [0.5], 9)
+    assert judged(loop_of(), controller_of(), *stages[:2]).verdict.value == "certified"
+    assert judged(loop_of(), controller_of(), *stages).verdict.value == "undecided"
+
+
+def test_inputs_are_those_of_the_plan_and_what_feedback_adds():
+    loop = loop_of(**AT_ONE, system=scalar("-x"), A=[[-1]], limits="{u: [-2, 3.9]}")
+    found = judged(loop, controller_of([[-9]]), (0, [0.2], 2))
+    assert [float(end) for end in found.inputs[0].range] == pytest.approx([-1, 3])
+    assert found.verdict.value == "certified"
 
 
 @pytest.mark.parametrize(
