@@ -89,8 +89,7 @@ def _pieces(found: Inequalities, boxes: Boxes) -> int:
 
 def _shorter(found: Inequalities, lags: int) -> Inequalities:
     cuts = tuple(tuple(min(cut, lags) for cut in row) for row in found.recipe.cuts)
-    recipe = replace(found.recipe, lags=lags, cuts=cuts)
-    return replace(found, recipe=recipe, responses=found.responses.shorter(lags))
+    return replace(found, recipe=replace(found.recipe, lags=lags, cuts=cuts))
 
 
 def _in_stages(found: Inequalities) -> Inequalities | None:
@@ -171,8 +170,8 @@ def explain(inequalities: Inequalities, stages: Sequence[Stage], evaluations: in
         first, last = (_causes(inequalities, boxes, stage) for stage in (0, len(stages) - 1))
     n, responses, missed = loop.states, inequalities.responses, np.zeros(inequalities.responses.passing)
     missed[-n - loop.inputs : -loop.inputs] = inequalities.remainders.defect
-    every = responses.past[-1, n * (len(responses.nodes) - 1) :][:n] + responses.direct[-1, :, : len(missed)]
-    widened = total(every, missed) / boxes.W.max(axis=0)
+    past = responses.past[inequalities.recipe.lags, n * (len(responses.nodes) - 1) :][:n]
+    widened = total(past + responses.direct[-1, :, : len(missed)], missed) / boxes.W.max(axis=0)
     return replace(
         _points(loop.plan),
         missed=fitting(loop) if (widened > _NOTABLE).any() else None,
@@ -194,7 +193,7 @@ def _causes(inequalities: Inequalities, boxes: Boxes, stage: int) -> list[Shares
     """What fills every e_i, then every delta_j and zeta, at the worst sample of a stage."""
     own, loop, n = inequalities.responses, inequalities.loop, inequalities.loop.states
     (b, direct, spread), eta = inequalities.terms(boxes), inequalities.phases(boxes)[2]
-    last, lag = n * (len(own.nodes) - 1), np.minimum(np.arange(len(b)), own.lags)
+    last, lag = n * (len(own.nodes) - 1), np.minimum(np.arange(len(b)), inequalities.recipe.lags)
     held = np.zeros(own.passing)
     held[own.passing - loop.inputs :] = inequalities.remainders.held
     during = slice(inequalities.starts[stage], [*inequalities.starts, len(b)][stage + 1])

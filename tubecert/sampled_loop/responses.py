@@ -8,7 +8,6 @@ Implements: theory of the sampled loop, section 3.
 
 from __future__ import annotations
 
-from copy import copy
 from fractions import Fraction
 from itertools import accumulate, pairwise
 from math import ceil
@@ -131,8 +130,10 @@ class Responses:
         self.now = self._counted(len(missed), xi=missed, heard=first[:, own.width :].magnitude)
         self.passing = self.now.shape[1] - own.width - self._r
         acting, heard = Acting(own, Ts, panels), step[:, own.width :]
-        parts = (self._entered(self.rows[part], acting, heard) for part in self._batches())
-        self.past, self.rate, self.size = map(self._cumulated, zip(*parts, strict=True))
+        each = np.concatenate([self._entered(self.rows[part], acting, heard) for part in self._batches()])
+        sums = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)])
+        parts = np.split(sums, [self.passing, self.passing + self._r], axis=2)
+        self.past, self.rate, self.size = map(np.ascontiguousarray, parts)
         reached = (Acting(own, s, panels).of(np.eye(n)) for s in self.nodes)
         self.direct = np.stack([self._counted(n, acting=each) for each in reached])
         self.pieces = np.stack([self._piece(acting, a, b) for a, b in pairwise(self.nodes)])
@@ -147,14 +148,6 @@ class Responses:
         xi = np.zeros((count, width)) if xi is None else xi
         wind, rho, _, rate = np.split(acting, [1, 1 + n + m, 1 + n + m + r], axis=1)
         return np.hstack([self.loop.noise.weigh(heard[:, :n])[:, None], wind, heard, rho, xi, rate])
-
-    def shorter(self, lags: int) -> Responses:
-        """The same over fewer lags; what the free rows miss is still counted over all."""
-        found = copy(self)
-        found.lags = lags
-        for name in ("rows", "past", "rate", "size"):
-            setattr(found, name, getattr(self, name)[: lags + 1])
-        return found
 
     @property
     def eta(self) -> Array:
@@ -183,21 +176,16 @@ class Responses:
         size = max(1, _AT_ONCE // self.rows[0].size)
         return [slice(start, min(start + size, self.lags)) for start in range(0, self.lags, size)]
 
-    def _entered(self, rows: Array, acting: Acting, heard: Interval) -> tuple[Array, Array, Array]:
-        """What the signals of each lag count: those that pass, the rate of eta, and its size."""
+    def _entered(self, rows: Array, acting: Acting, heard: Interval) -> Array:
+        """What the signals of each lag count, side by side: those that pass, the rate of eta, and its size."""
         flat, r = rows.reshape(-1, rows.shape[2]), self._r
         jumps = product(Interval.exact(flat), heard).magnitude
-        e, eta = np.ascontiguousarray(flat[:, : self.loop.states]), flat[:, self.dynamics.width - r :]
-        acted = acting.of(e, eta)
+        acted = acting.of(
+            np.ascontiguousarray(flat[:, : self.loop.states]), flat[:, self.dynamics.width - r :]
+        )
         passing = self._counted(len(flat), heard=jumps, acting=acted)[:, : self.passing]
-        both = acted[:, acted.shape[1] - r :], acted[:, acted.shape[1] - 2 * r : acted.shape[1] - r]
-        passing, rate, size = (own.reshape(*rows.shape[:2], -1) for own in (passing, *both))
-        return passing, rate, size
-
-    def _cumulated(self, parts: tuple[Array, ...]) -> Array:
-        """Sums over the lags before each."""
-        whole = np.concatenate(parts)
-        return np.concatenate([np.zeros_like(whole[:1]), np.cumsum(whole, axis=0)])
+        size, rate = np.split(acted[:, acted.shape[1] - 2 * r :], 2, axis=1)
+        return np.hstack([passing, rate, size]).reshape(*rows.shape[:2], -1)
 
     def _piece(self, acting: Acting, a: Fraction, b: Fraction) -> Array:
         """How far e is from its chord between two nodes (theory, 3.4)."""

@@ -115,8 +115,8 @@ class Inequalities:
 
         But for roundings; a difference of two sums may be off by those of both.
         """
-        own, k = self.responses, np.arange(self.last + 1)
-        (starts, sizes, slow), lag = self.phases(boxes), np.minimum(k, own.lags)
+        own, L, k = self.responses, self.recipe.lags, np.arange(self.last + 1)
+        (starts, sizes, slow), lag = self.phases(boxes), np.minimum(k, L)
         widest, e = sizes.max(axis=0), slice(own.passing, own.passing + self.loop.states)
         widest[e] = np.maximum(widest[e], self.loop.start.reach)  # zeta and v are 0 at boot
         b = total(own.now, widest) + self.slow(slow) + self.first(k)
@@ -125,14 +125,11 @@ class Inequalities:
             newer, older = np.clip(k - start, 0, lag), np.clip(k - end, 0, lag)
             b += answers[newer] - answers[older] + 4 * ROUNDED * answers[newer]
         phase = np.searchsorted(starts, k, side="right") - 1
-        core = slice(
-            own.passing, own.passing + own.rows.shape[2] - own.eta.shape[2]
-        )  # eta stands with its cut
-        late = total(np.abs(own.rows[-1, :, : core.stop - core.start]), sizes[:, core].T).T
-        b[own.lags + 1 :] += late[phase[1 : max(1, len(k) - own.lags)]]  # |r_L| Xi of the sample L before
-        direct, spread = (
-            np.moveaxis(total(each, sizes.T), -1, 0)[phase] for each in (own.direct, own.pieces)
-        )
+        core = own.rows.shape[2] - own.eta.shape[2]  # eta stands with its cut
+        late = total(np.abs(own.rows[L, :, :core]), sizes[:, own.passing : own.passing + core].T).T
+        b[L + 1 :] += late[phase[1 : max(1, len(k) - L)]]  # |r_L| Xi of the sample L before
+        acted = (total(each, sizes.T) for each in (own.direct, own.pieces))
+        direct, spread = (np.moveaxis(each, -1, 0)[phase] for each in acted)
         return b, direct, spread
 
     def phases(self, boxes: Boxes) -> tuple[list[int], Array, Sizes]:
@@ -178,11 +175,11 @@ class Inequalities:
         k, (R, r) = np.arange(self.last + 1)[:, None, None], own.eta.shape[1:]
         about = [*np.tile(np.arange(n), len(own.nodes)), *range(n, len(cuts))]  # row by row: e, delta, zeta
         cut = np.array(cuts, dtype=np.intp).reshape(len(cuts), r)[about]
-        lag = np.minimum(k, own.lags)
+        lag = np.minimum(k, self.recipe.lags)
         rows, column = np.arange(R)[None, :, None], np.arange(r)[None, None]
         upto = np.minimum(lag, cut)
         entry = np.abs(own.eta[upto, rows, column])
-        begins = (k <= cut) & (k <= own.lags)  # the row still holds the entry that meets eta(0)
+        begins = (k <= cut) & (k <= self.recipe.lags)  # the row still holds the entry that meets eta(0)
         older, newer = own.size[lag, rows, column], own.size[upto, rows, column]
         return (
             own.rate[upto, rows, column],
@@ -193,7 +190,7 @@ class Inequalities:
     def first(self, k: _INDEX) -> Array:
         """sup |r_k xi_0| of the start, for k <= L; afterwards nothing."""
         own, start, n = self.responses, self.loop.start, self.loop.states
-        early = own.rows[: min(len(k), own.lags + 1), :, :n]
+        early = own.rows[: min(len(k), self.recipe.lags + 1), :, :n]
         known = np.abs(early @ start.known.mid[:, 0])
         size = np.abs(early)
         known += size @ (start.known.rad[:, 0] + start.box) + 64 * UNIT * (size @ start.known.magnitude[:, 0])
