@@ -100,16 +100,8 @@ def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, No
         checked = check(loop, found.tables, stages, inequalities.recipe)
         notes = explain(inequalities, stages, found.evaluations)
         over = {lack.where: lack for lack in checked.lacks if lack.kind == "inputs"}
-        result = replace(
-            plain,
-            verdict=checked.verdict,
-            controller=found.tables,
-            tube=stages,
-            inputs=checked.inputs,
-            clearance=checked.clearance,
-            recipe=inequalities.recipe,
-            lacks=checked.lacks,
-        )
+        proposed = replace(plain, controller=found.tables, tube=stages, recipe=inequalities.recipe)
+        result = replace(proposed, **checked._asdict())
         if not over or loop.spec.controller == "none":
             break
         narrow *= [

@@ -82,7 +82,10 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
         raise NoDesign("no_design")
     theta, response = reached
     alone = response.ever + response.gain @ search.constant
-    _refuse_inputs(plant, alone[len(s) :] * u)
+    needed = alone[len(s) :] * u
+    if (needed > plant.room).any():
+        j = int(np.argmax(needed - plant.room))
+        raise NoDesign("inputs", j, float(needed[j]), float(plant.room[j]))
     size, moved = settle(own, response.gain, response.ever, MANY)
     (W, U), first = np.split(size * np.r_[s, u], [len(s)]), alone[: len(s)] * s
     if (
@@ -123,13 +126,6 @@ def _refuse_unheld(plant: Plant) -> None:
             if needed > strength:
                 j = int(np.argmax(moved))
                 raise NoDesign("inputs", j, float(plant.room[j] * needed / strength), float(plant.room[j]))
-
-
-def _refuse_inputs(plant: Plant, U: Array) -> None:
-    """Every input must be within its room."""
-    j = int(np.argmax(U - plant.room))
-    if U[j] > plant.room[j]:
-        raise NoDesign("inputs", j, float(U[j]), float(plant.room[j]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

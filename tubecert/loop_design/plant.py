@@ -16,6 +16,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.sampled_loop.remainders import Remainders
 
 CLEAN: Final = 1e-12  # what is smaller, relative to what stands beside it, is of rounding alone
+_QUIET: Final = 1e-300  # what is smaller is a 0 that was rounded outward
 _FEW: Final = 48  # windows for a search
 _SHARE: Final = 0.1  # of the safe set: where the remainder is fitted
 _ROOM: Final = 1.0  # of an input without limits, there
@@ -140,6 +141,7 @@ def in_units(plant: Plant) -> Plant:
         pushed = np.max([np.abs(flow(plant.A, columns, horizon * i / 8)[1]) for i in range(1, 9)], axis=0)
         signals, moved = np.split(pushed, [-plant.B.shape[1]], axis=1)
         s = np.max([signals.sum(axis=1), plant.noise, plant.start], axis=0)
+        s = np.where(s > _QUIET, s, 0.0)
         answers = (moved / np.where(s > 0, s, np.inf)[:, None]).max(axis=0)
         u = np.where(np.isfinite(plant.room), plant.room, 10 / np.where(answers > 0, answers, 10))
         s = np.maximum(s, 0.1 * moved @ u)

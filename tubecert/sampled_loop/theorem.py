@@ -201,9 +201,8 @@ class Inequalities:
         return found
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
-    """The verdict on stages and a recipe, with what else is proven or missing."""
+class Checked(NamedTuple):
+    """The verdict on stages and a recipe, with what else is proven or missing, as a result has it."""
 
     verdict: Verdict
     inputs: tuple[InputUse, ...] = ()
