@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from tubecert.controller.recursion import linear
 from tubecert.simulation.sampled import campaign
 from tubecert.simulation.sampled.attack import Attack, Lanes, goals, worst_of
-from tubecert.simulation.sampled.campaign import simulate
+from tubecert.simulation.sampled.campaign import Campaign, simulate
 from tubecert.simulation.sampled.loop import resolved
 
 
@@ -60,6 +60,31 @@ def test_signals_and_starts_keep_to_their_bounds_however_small_kernels_are():
     assert starts.max() <= 0.02 * (1 + 1e-12)
     for k in (0, 1, 149):
         assert np.linalg.norm(lanes.signals(k)[0], axis=0).max() <= 0.0005 * (1 + 1e-12)
+
+
+@pytest.mark.slow
+def test_an_adversary_begins_again_after_its_aim():
+    attack = Attack(setting("scalar"), seed=0)
+    [number, *_] = np.flatnonzero(attack.aims[:, 1] == 8)
+    lanes = Lanes(attack, range(number, number + 1))
+    noise = np.array([lanes.signals(k)[0] for k in range(18)])
+    np.testing.assert_array_equal(noise[:9], noise[9:])
+    assert noise.any()
+
+
+@pytest.mark.slow
+def test_an_h_of_which_only_the_size_is_known_may_jump():
+    own = setting("cart", ('{h: ["0.2*sin(t)"]}', "{bounds: {h: 0.2}}"))
+    assert (own.slow.size, own.slow.rate, own.slow.first) == (0.2, np.inf, 0.2)
+
+
+@pytest.mark.slow
+def test_one_run_that_is_not_resolved_is_no_result():
+    attack = Attack(setting("scalar"), seed=0)
+    seen = resolved(attack, partial(linear, attack.setting.tables), range(2))
+    for error, outcome in ((0.009, "not falsified"), (0.011, "no result")):
+        found = Campaign(attack, "h", 2, "floats", [seen._replace(error=np.array([0.0, error]))])
+        assert found.outcome == outcome
 
 
 def sabotaged(how):
