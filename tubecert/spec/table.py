@@ -75,7 +75,7 @@ def read_table(
     sheet = opened(entry)
     if sheet is None:
         return None
-    found, n = _rows(sheet, columns, names, interpolation), len(names.states)
+    found, n = _PlanFile(sheet, columns, names).rows(interpolation), len(names.states)
     entry.reader.findings.extend(capped(sheet.findings, codes.LIMIT, ENOUGH))
     if found is None or sheet.findings:
         return None
@@ -95,110 +95,101 @@ def read_table(
     )
 
 
-def _rows(
-    sheet: Sheet, columns: tuple[Column, ...] | None, names: Names, interpolation: Interpolation
-) -> list[list[Fraction]] | None:
-    """The rows as t, states, inputs."""
-    lines = rows(sheet, "a plan")
-    header = next(lines, None)
-    wanted = _variables(names) if columns is None else tuple(column.name for column in columns)
-    if sheet.findings:
-        return None
-    if header is None:
-        message = "the plan file is empty"
-        return sheet.fail(Cell(line=0), codes.PLAN_COLUMNS, message, _wanted(wanted))
-    places = _columns(sheet, header, wanted, others=columns is not None)
-    if places is None:
-        return None
-    sheet.note(header)
-    scales = [column.scale for column in columns or ()] or [Fraction(1)] * len(wanted)
-    reader = _Rows(sheet, len(header), places, scales, inputs=len(names.inputs))
-    values: list[list[Fraction]] = []
-    for row in lines:
-        if len(values) == MAX_ROWS:
-            return sheet.fail(
-                row[0], codes.LIMIT, f"a plan has at most {MAX_ROWS:,} rows", "give every second knot"
-            )
-        numbers = reader.numbers(row, values[-1] if values else None)
-        if numbers is not None:
-            sheet.shown = True
-            values.append(numbers)
-            sheet.note(row)
-        if len(sheet.findings) >= ENOUGH:
-            return None
-    last = Cell(line=len(sheet.source.lines) - 1)
-    if len(values) < 2 and not sheet.findings:
-        message = f"a plan needs 2 rows or more below its header, not {len(values)}"
-        sheet.fail(last if values else header[0], codes.PLAN_TIMES, message)
-    elif interpolation == "hermite-simpson" and len(values) % 2 == 0 and not sheet.findings:
-        message = f"hermite-simpson needs an odd number of rows, not {len(values)}"
-        help = "rows are in turn a knot and the point between it and the next knot"
-        sheet.fail(last, codes.PLAN_TIMES, message, help)
-    return None if sheet.findings else values
+class _PlanFile:
+    """A plan file being read: where t, the states and the inputs stand, and in which names and units."""
 
-
-def _columns(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, others: bool) -> list[int] | None:
-    """Where t, the states and the inputs stand, perhaps among others."""
-    if header[0].text.startswith("#"):  # as numpy.savetxt writes it
-        bare = header[0].text.lstrip("# \t")
-        moved = header[0].column + len(header[0].text) - len(bare)
-        header[0] = Cell(text=bare, line=header[0].line, column=moved)
-    if not any(cell.text in wanted for cell in header):
-        cells = "has 1 cell, which is" if len(header) == 1 else f"has {len(header)} cells, none of which is"
-        message = f"the first line {cells} t, a state or an input"
-        commas = len(header) == 1 and re.search(r"[;\t ]", header[0].text)
-        help = f"{'separate columns by commas; ' if commas else ''}{_wanted(wanted)}"
-        return sheet.fail(Cell(line=header[0].line), codes.PLAN_COLUMNS, message, help)
-    # of columns with names that a stranger chose nothing is shown before a row of numbers
-    sheet.shown = not others and all(_NAME.fullmatch(cell.text) for cell in header)
-    place = _placed(sheet, header, wanted, others=others)
-    missing = [name for name in wanted if name not in place]
-    if missing and not sheet.findings:
-        message = f"the plan file lacks {'a column' if len(missing) == 1 else 'columns'} {', '.join(missing)}"
-        sheet.fail(header[0], codes.PLAN_COLUMNS, message, _wanted(wanted))
-    return None if sheet.findings else [place[name] for name in wanted]
-
-
-def _placed(sheet: Sheet, header: list[Cell], wanted: tuple[str, ...], *, others: bool) -> dict[str, int]:
-    """The columns by name; those that occur twice are findings, and so are those not wanted without `others`."""
-    place: dict[str, int] = {}
-    for index, cell in enumerate(header):
-        if cell.text in place:
-            sheet.fail(cell, codes.PLAN_COLUMNS, f"the column {cell.text} occurs twice", "keep one")
-        elif cell.text in wanted:
-            place[cell.text] = index
-        elif not others:
-            said = f"{cell.text!r}" if _NAME.fullmatch(cell.text) else f"the name of column {index + 1}"
-            message = f"{said} is neither t nor a state nor an input"
-            help = suggestion(cell.text, wanted, what="columns") if sheet.shown else _wanted(wanted)
-            help += "; trajectory.columns names columns, and skips others"
-            sheet.fail(cell, codes.PLAN_COLUMNS, message, help)
-    return place
-
-
-def _variables(names: Names) -> tuple[str, ...]:
-    return (TIME, *names.states, *names.inputs)
-
-
-def _wanted(columns: tuple[str, ...]) -> str:
-    return f"the first line names the columns: {','.join(columns)}"
-
-
-class _Rows:
-    """Rows of cells as numbers: where t, the states and the inputs stand, and what their numbers are multiplied by."""
-
-    def __init__(
-        self, sheet: Sheet, width: int, places: list[int], scales: list[Fraction], *, inputs: int
-    ) -> None:
-        self.sheet, self.width, self.inputs = sheet, width, inputs
-        self.columns = tuple(zip(places, scales, strict=True))
+    def __init__(self, sheet: Sheet, columns: tuple[Column, ...] | None, names: Names) -> None:
+        self.sheet, self.others = sheet, columns is not None  # whether there may be others
+        self.columns = columns or tuple(Column(name=name) for name in _variables(names))
+        self.wanted = tuple(column.name for column in self.columns)
+        self.kept = len(self.columns) - len(names.inputs)  # t and the states, which no row may lack
         self.last = max((k for k, line in enumerate(sheet.source.lines) if line.strip()), default=0)
+        self.width = 0
+        self.places: list[int] = []
 
-    def numbers(self, row: list[Cell], before: list[Fraction] | None) -> list[Fraction] | None:
+    def rows(self, interpolation: Interpolation) -> list[list[Fraction]] | None:
+        """The rows as t, states, inputs."""
+        sheet, lines = self.sheet, rows(self.sheet, "a plan")
+        header = next(lines, None)
+        if sheet.findings:
+            return None
+        if header is None:
+            return sheet.fail(Cell(line=0), codes.PLAN_COLUMNS, "the plan file is empty", self._all())
+        if not self._is_header(header):
+            return None
+        sheet.note(header)
+        values: list[list[Fraction]] = []
+        for row in lines:
+            if len(values) == MAX_ROWS:
+                message = f"a plan has at most {MAX_ROWS:,} rows"
+                return sheet.fail(row[0], codes.LIMIT, message, "give every second knot")
+            numbers = self._numbers(row, values[-1] if values else None)
+            if numbers is not None:
+                sheet.shown = True
+                values.append(numbers)
+                sheet.note(row)
+            if len(sheet.findings) >= ENOUGH:
+                return None
+        last = Cell(line=len(sheet.source.lines) - 1)
+        if len(values) < 2 and not sheet.findings:
+            message = f"a plan needs 2 rows or more below its header, not {len(values)}"
+            sheet.fail(last if values else header[0], codes.PLAN_TIMES, message)
+        elif interpolation == "hermite-simpson" and len(values) % 2 == 0 and not sheet.findings:
+            message = f"hermite-simpson needs an odd number of rows, not {len(values)}"
+            help = "rows are in turn a knot and the point between it and the next knot"
+            sheet.fail(last, codes.PLAN_TIMES, message, help)
+        return None if sheet.findings else values
+
+    def _is_header(self, header: list[Cell]) -> bool:
+        """Whether the first line names t, the states and the inputs, perhaps among others."""
+        sheet = self.sheet
+        if header[0].text.startswith("#"):  # as numpy.savetxt writes it
+            bare = header[0].text.lstrip("# \t")
+            moved = header[0].column + len(header[0].text) - len(bare)
+            header[0] = Cell(text=bare, line=header[0].line, column=moved)
+        if not any(cell.text in self.wanted for cell in header):
+            cells = (
+                "has 1 cell, which is" if len(header) == 1 else f"has {len(header)} cells, none of which is"
+            )
+            message = f"the first line {cells} t, a state or an input"
+            commas = len(header) == 1 and re.search(r"[;\t ]", header[0].text)
+            help = f"{'separate columns by commas; ' if commas else ''}{self._all()}"
+            sheet.fail(Cell(line=header[0].line), codes.PLAN_COLUMNS, message, help)
+            return False
+        # of columns with names that a stranger chose nothing is shown before a row of numbers
+        sheet.shown = not self.others and all(_NAME.fullmatch(cell.text) for cell in header)
+        place = self._placed(header)
+        missing = [name for name in self.wanted if name not in place]
+        if missing and not sheet.findings:
+            what = "a column" if len(missing) == 1 else "columns"
+            message = f"the plan file lacks {what} {', '.join(missing)}"
+            sheet.fail(header[0], codes.PLAN_COLUMNS, message, self._all())
+        self.width, self.places = len(header), [place.get(name, 0) for name in self.wanted]
+        return not sheet.findings
+
+    def _placed(self, header: list[Cell]) -> dict[str, int]:
+        """The columns by name; those that occur twice are findings, and so are others, unless there may be some."""
+        place: dict[str, int] = {}
+        for index, cell in enumerate(header):
+            if cell.text in place:
+                self.sheet.fail(cell, codes.PLAN_COLUMNS, f"the column {cell.text} occurs twice", "keep one")
+            elif cell.text in self.wanted:
+                place[cell.text] = index
+            elif not self.others:
+                said = f"{cell.text!r}" if _NAME.fullmatch(cell.text) else f"the name of column {index + 1}"
+                message = f"{said} is neither t nor a state nor an input"
+                help = suggestion(cell.text, self.wanted, what="columns") if self.sheet.shown else self._all()
+                help += "; trajectory.columns names columns, and skips others"
+                self.sheet.fail(cell, codes.PLAN_COLUMNS, message, help)
+        return place
+
+    def _all(self) -> str:
+        return f"the first line names the columns: {','.join(self.wanted)}"
+
+    def _numbers(self, row: list[Cell], before: list[Fraction] | None) -> list[Fraction] | None:
         """The numbers of a row, whose time lies after the one `before`; in the last one inputs may be absent."""
-        kept = len(self.columns) - self.inputs
         ends = before is not None and row[0].line == self.last
-        if ends and len(row) > max(place for place, _ in self.columns[:kept]):
+        if ends and len(row) > max(self.places[: self.kept]):
             row = row + [replace(row[-1], text="")] * (self.width - len(row))
         if len(row) != self.width:
             count = "1 cell" if len(row) == 1 else f"{len(row)} cells"
@@ -206,29 +197,30 @@ class _Rows:
             message = f"the row has {count}; the header names {self.width} columns"
             return self.sheet.fail(where, codes.PLAN_COLUMNS, message)
         found: list[Fraction | None] = []
-        for k, (place, scale) in enumerate(self.columns):
-            absent = ends and k >= kept and row[place].text.lower() in _ABSENT
-            found.append(
-                before[k] if absent and before else self._number(row[place], scale, is_input=k >= kept)
-            )
-        sound = [value for value in found if value is not None]
-        if len(sound) < len(found):
-            return None
-        if before and sound[0] <= before[0]:
-            cell = row[self.columns[0][0]]
+        for k, (place, column) in enumerate(zip(self.places, self.columns, strict=True)):
+            absent = k >= self.kept and row[place].text.lower() in _ABSENT
+            own = before[k] if absent and ends and before else self._number(row[place], column, absent=absent)
+            found.append(own)
+        sound = whole(found)
+        if sound and before and sound[0] <= before[0]:
+            cell = row[self.places[0]]
             message = f"t = {cell.text[:40]} does not lie after the time before it"
             self.sheet.fail(cell, codes.PLAN_TIMES, message, "times must increase from row to row")
-        return sound
+        return None if sound is None else list(sound)
 
-    def _number(self, cell: Cell, scale: Fraction, *, is_input: bool) -> Fraction | None:
-        if is_input and cell.text.lower() in _ABSENT:
+    def _number(self, cell: Cell, column: Column, *, absent: bool) -> Fraction | None:
+        if absent:
             message = "an input is missing in this row; the last row alone may lack inputs"
             help = "give the value (if it is held, that before it), or leave the row out"
             return self.sheet.fail(cell, codes.NUMBER, message, help)
         value = number(self.sheet, cell)
-        if value is None or scale == 1:
+        if value is None or column.scale == 1:
             return value
-        scaled = rounded(value * scale, DIGITS)
+        scaled = rounded(value * column.scale, DIGITS)
         if extreme := out_of_range(scaled):
             self.sheet.fail(cell, codes.LIMIT, f"{cell.text[:40]} in its scale is {extreme}", MODERATE)
         return scaled
+
+
+def _variables(names: Names) -> tuple[str, ...]:
+    return (TIME, *names.states, *names.inputs)
