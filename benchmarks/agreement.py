@@ -16,10 +16,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from flint import ctx
 
-from tubecert.recheck.certificate import read_result
+from tubecert.recheck.certificate import opened, read_result
 from tubecert.recheck.claims import Case
 from tubecert.recheck.constants import OVER_TUBE, bounded
-from tubecert.recheck.document import opened, read
+from tubecert.recheck.document import read
 
 _LARGEST = Fraction(10)  # of mu in the search for du: more than smax(Theta B) of the shipped systems
 

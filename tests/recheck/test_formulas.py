@@ -109,7 +109,7 @@ def of_recheck(problem: TubeProblem, gains: RateRecipe, own: DistanceRecipe) -> 
     with ctx.workprec(160):
         setting, at, proof = reading(problem), gains_of(gains), proof_of(own)
         S = (setting.n.h_t + setting.n.h_x * proof.speed) / exact(gains.bandwidth)
-        held = conditions.larger(setting.n.h_initial, proof.uncertainty) + proof.prediction_error
+        held = setting.n.h_initial.max(proof.uncertainty) + proof.prediction_error
         D = conditions.distance_bound(setting, at, proof)
         found = {
             "0: A1": own_alone.settled(setting, setting.n.h),
@@ -174,7 +174,7 @@ OF_RECHECK = {
     ),
 }
 SWAPPED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult}
-NAMES = {"minimum": "maximum", "maximum": "minimum", "smaller": "larger", "larger": "smaller"}
+NAMES = {"minimum": "maximum", "maximum": "minimum", "min": "max", "max": "min"}
 
 
 def sites(tree: ast.AST) -> Iterator[tuple[ast.AST, str, object]]:
@@ -186,6 +186,8 @@ def sites(tree: ast.AST) -> Iterator[tuple[ast.AST, str, object]]:
             yield node, "value", node.value + 1
         elif isinstance(node, ast.Name) and node.id in NAMES:
             yield node, "id", NAMES[node.id]
+        elif isinstance(node, ast.Attribute) and node.attr in NAMES:
+            yield node, "attr", NAMES[node.attr]
         elif isinstance(node, ast.IfExp):
             yield node, "test", ast.UnaryOp(ast.Not(), node.test)
 

@@ -18,6 +18,7 @@ from rechecked import (
     respecified,
     sealed,
     shipped,
+    terms,
     unconfirmed,
 )
 from systems import BLOWN, SCALAR, SMALL
@@ -30,6 +31,7 @@ from tubecert.expression import number_text
 from tubecert.recheck import geodesics
 from tubecert.recheck.claims import of_certified
 from tubecert.recheck.constants import feedback_gain
+from tubecert.recheck.monomials import degree
 from tubecert.records import FormError
 
 GIVEN = 'metric: {rate: 0.8, dual_metric: [[1, "-0.3"], ["-0.3", 2]]}'
@@ -88,6 +90,13 @@ ASKED = {  # of a metric in y alone, of degree 2 at most
     "a solver that there is not": {"solver": "mosek"},
     "coordinates that there are not": {"coordinates": "polar"},
 }
+
+
+@pytest.mark.parametrize(
+    ("text", "most"), [("x*sin(y)**2*cos(y) + x", 4), ("(x + 1)**2 - x**2", 1), ("3/2", 0)]
+)
+def test_a_degree_counts_waves_as_variables(text, most):
+    assert degree(terms([text], ["x", "y"])) == most
 
 
 @pytest.fixture(scope="module")

@@ -159,8 +159,7 @@ def belongs(document: Node, name: str, spec: Specifiable) -> str:
     from tubecert.certificate.file import incomplete
     from tubecert.certificate.result import Result
     from tubecert.library.specification import spec_of
-    from tubecert.recheck.certificate import read_result
-    from tubecert.recheck.document import opened
+    from tubecert.recheck.certificate import opened, read_result
     from tubecert.records import FormError
 
     read_result(opened(document)[0])  # its form: what is compared below is there, and is what is examined

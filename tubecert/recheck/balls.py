@@ -233,12 +233,6 @@ def stacked(parts: Sequence[arb_mat]) -> arb_mat:
     return joined([[own] for own in parts])
 
 
-def parted(a: arb_mat, at: int) -> tuple[arb_mat, arb_mat]:
-    """The columns before one, and the others."""
-    left, right = ([x for row in a.tolist() for x in row[part]] for part in (slice(at), slice(at, None)))
-    return arb_mat(a.nrows(), at, left), arb_mat(a.nrows(), a.ncols() - at, right)
-
-
 def sizes(a: arb_mat) -> arb_mat:
     """The entries' largest magnitudes."""
     return arb_mat(a.nrows(), a.ncols(), [x.abs_upper() for x in a.entries()])

@@ -13,7 +13,7 @@ from typing import Any
 
 from tubecert.recheck import wind
 from tubecert.recheck.coordinates import Coordinates
-from tubecert.recheck.document import Enclosure, Members, Node, each
+from tubecert.recheck.document import Enclosure, Members, Node, digest, each
 from tubecert.recheck.grammar import GrammarError, read_number
 from tubecert.recheck.inputs import read_limited
 from tubecert.recheck.kinds.kind import VERDICTS, Section
@@ -35,8 +35,19 @@ from tubecert.recheck.specified.numbers import Range, Rows
 from tubecert.recheck.specified.plant import Plant, Wanted, read_wanted
 from tubecert.recheck.specified.trajectory import read_start
 
+NOT_HASHED = ("notes", "run")
+"""Members of a certificate beside its result: what they say is not examined."""
+
 _PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*|\[\d{1,6}\])*", re.ASCII)
 _PART = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]", re.ASCII)
+
+
+def opened(document: Node) -> tuple[Node, str, str]:
+    """The result of a certificate, the hash that it states, and the one that the result has."""
+    own = document.closed("format", "hash", "result", *NOT_HASHED)
+    for key in NOT_HASHED:
+        own[key].mapping()
+    return own["result"], own["hash"].text(), digest(own["result"].value)
 
 
 def read_result(node: Node) -> Result:
@@ -120,8 +131,9 @@ def _complete(node: Node, result: Result) -> Result:
 
 def _claim(node: Node, states: tuple[str, ...], inputs: tuple[str, ...]) -> Claim:
     def plans(item: Node) -> Plans:
-        x, u = (lambda own, names=names: _box(own, names, Node.exact) for names in (states, inputs))
-        return item.record(Plans, x=x, u=u)
+        own = item.closed("x", "u", "defect")
+        x, u = (_box(own[key], names, Node.exact) for key, names in (("x", states), ("u", inputs)))
+        return x, u, own["defect"].exact()
 
     return node.record(
         Claim,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from flint import arb, ctx
@@ -16,7 +16,7 @@ from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.conditions import USED, Numbers, Setting, WindNumbers
 from tubecert.recheck.constants import OVER_TUBE, bounded, contained, half_width, largest_push
 from tubecert.recheck.coordinates import Coordinates
-from tubecert.recheck.cover import SHARP, Claim, Outcome, stated, together
+from tubecert.recheck.cover import SHARP, Claim, Domain, Outcome, stated, together
 from tubecert.recheck.curve import Curve
 from tubecert.recheck.document import Enclosure, digest
 from tubecert.recheck.kinds.kind import Ground, Kind, Section
@@ -29,6 +29,8 @@ from tubecert.recheck.specified.plant import Metric
 from tubecert.recheck.specified.trajectory import Expressed, Planned
 from tubecert.recheck.system import System, curve_of, system_of
 from tubecert.recheck.terms import all_zero
+
+Bound = Callable[[System, Fraction, Domain, int], Outcome]
 
 
 @dataclass(frozen=True)
@@ -159,15 +161,15 @@ class Case:
 
 def of_every(result: Result) -> Iterator[Claim]:
     """What every certificate says of itself, whatever its verdict."""
-    yield Claim("the specification and what repeats it", None, lambda: consistency.specification(result))
-    yield Claim("the claim is that of the specification", None, lambda: consistency.claimed(result))
-    yield Claim("bounds are intervals", None, lambda: consistency.bounds(result))
+    yield Claim("the specification and what repeats it", None, partial(consistency.specification, result))
+    yield Claim("the claim is that of the specification", None, partial(consistency.claimed, result))
+    yield Claim("bounds are intervals", None, partial(consistency.bounds, result))
 
 
 def of_certified(case: Case) -> Iterator[Claim]:
     """Every claim that a verdict `certified` rests on, and those that stand beside it."""
     result = case.result
-    yield Claim("the verdict follows from the sections", None, lambda: consistency.verdict(result))
+    yield Claim("the verdict follows from the sections", None, partial(consistency.verdict, result))
     yield Claim("assumptions are complete", None, lambda: consistency.assumptions(result, case.system))
     yield from _on_set(case)
     yield from _tube(case)
@@ -179,53 +181,33 @@ def of_certified(case: Case) -> Iterator[Claim]:
 
 def _on_set(case: Case) -> Iterator[Claim]:
     s, budget, whole, shown = case.system, case.budget, case.whole, case.metric
-    on_set = metric.on_set(s)
-    yield Claim("f, B, W, h and the plan are smooth", (*case.over_tube,), lambda: _smooth(case))
-    yield Claim("rank(B) = m on the safe set", whole, lambda: metric.full_rank(s, budget))
+    on_set, own = metric.on_set(s), case.result.specification.metric
+    assert isinstance(own, Metric)
+    yield Claim("f, B, W, h and the plan are smooth", case.over_tube, partial(_smooth, case))
+    yield Claim("rank(B) = m on the safe set", whole, partial(metric.full_rank, s, budget))
     lower = None if shown.lower_on_set is None else shown.lower_on_set.below
     upper = None if shown.upper_on_set is None else shown.upper_on_set.above
-    if lower is not None:
-        yield Claim(
-            f"C1: M >= {float(lower):.6g} I on the safe set",
-            (*whole, lower),
-            lambda: metric.lower_bound(s, lower, on_set, budget),
-        )
-    if upper is not None:
-        yield Claim(
-            f"C1: M <= {float(upper):.6g} I on the safe set",
-            (*whole, upper),
-            lambda: metric.upper_bound(s, upper, on_set, budget),
-        )
-    yield Claim(
-        "C1 has bounds on the safe set",
-        (lower is None, upper is None),
-        lambda: stated(None not in (lower, upper), "there are none"),
-    )
-    yield from _declared(case)
-    yield Claim("C3: the Killing condition", whole, lambda: metric.killing(s))
+    found = ((">=", lower, metric.lower_bound), ("<=", upper, metric.upper_bound))
+    declared = ((">=", own.lower, metric.lower_bound), ("<=", own.upper, metric.upper_bound))
+
+    def bounds(what: str, sides: tuple[tuple[str, Fraction | None, Bound], ...]) -> Iterator[Claim]:
+        for relation, bound, holds in sides:
+            if bound is not None:
+                name = f"{what}: M {relation} {float(bound):.6g} I on the safe set"
+                yield Claim(name, (*whole, bound), partial(holds, s, bound, on_set, budget))
+
+    yield from bounds("C1", found)
+    none = (lower is None, upper is None)
+    yield Claim("C1 has bounds on the safe set", none, partial(stated, not any(none), "there are none"))
+    yield from bounds("metric.bounds", declared)
+    yield Claim("C3: the Killing condition", whole, partial(metric.killing, s))
     if len(s.inputs) < len(s.states):
         most = _rate_margin(case)
         yield Claim(
             f"C2 on the safe set at rate {float(s.rate):.6g} + {float(most):.4g}",
             (*whole, most),
-            lambda: metric.contraction(s, most, budget) if most > 0 else stated(False, "no margin"),
+            partial(metric.contraction, s, most, budget) if most > 0 else partial(stated, False, "no margin"),
         )
-
-
-def _declared(case: Case) -> Iterator[Claim]:
-    """What the specification itself says of M on the safe set."""
-    s, own = case.system, case.result.specification.metric
-    assert isinstance(own, Metric)
-    for relation, bound, holds in (
-        (">=", own.lower, metric.lower_bound),
-        ("<=", own.upper, metric.upper_bound),
-    ):
-        if bound is not None:
-            yield Claim(
-                f"metric.bounds: M {relation} {float(bound):.6g} I on the safe set",
-                case.whole,
-                lambda bound=bound, holds=holds: holds(s, bound, metric.on_set(s), case.budget),  # type: ignore[misc]
-            )
 
 
 def _rate_margin(case: Case) -> Fraction:
@@ -253,16 +235,15 @@ def _tube(case: Case) -> Iterator[Claim]:
     place, trajectory, plan = case.place, case.result.specification.trajectory, case.result.plan
     lower, upper = case.bound_if_any("lower"), case.bound_if_any("upper")
     if isinstance(trajectory, Planned):
-        yield Claim(
-            "the plan serves its task", (*case.whole, case.knots), lambda: serves(trajectory, plan), SHARP
-        )
+        key = *case.whole, case.knots
+        yield Claim("the plan serves its task", key, partial(serves, trajectory, plan), SHARP)
     yield Claim(
         f"rho = {float(place.rho):.6g} is large enough",
         (*case.over_tube, lower, upper, case.tube.epsilon, case.tube.rho_a),
-        lambda: _radius(case),
+        partial(_radius, case),
         SHARP,
     )
-    yield Claim("the tube lies in the safe set", case.over_tube, lambda: contained(place))
+    yield Claim("the tube lies in the safe set", case.over_tube, partial(contained, place))
     for name, width in (case.tube.half_widths or {}).items():
         yield Claim(
             f"half-width of {name} <= {float(width):.6g}",
@@ -288,86 +269,67 @@ def _clearances(case: Case) -> Iterator[Claim]:
         yield Claim(
             f"W in the plane of {', '.join(obstacle.states)}",
             (*case.over_tube, obstacle.states, own.shape),
-            lambda obstacle=obstacle, own=own: clearances.shaped(place, obstacle, own.shape),  # type: ignore[misc]
+            partial(clearances.shaped, place, obstacle, own.shape),
         )
         if own.verdict != "certified" or lower is None or own.clearance.below is None:
             continue
         yield Claim(
             f"clearance from obstacle {k} >= {float(own.clearance.below):.6g}",
             (*case.over_tube, obstacle, own, lower),
-            lambda obstacle=obstacle, own=own: clearances.keeps_away(place, obstacle, own, lower),  # type: ignore[misc]
+            partial(clearances.keeps_away, place, obstacle, own, lower),
         )
 
 
 def _planned_inputs(case: Case) -> Iterator[Claim]:
     for own in case.result.inputs:
-        yield Claim(
+        name, key = (
             f"{own.name}* of the plan is in the range that is stated",
-            (*case.over_tube, own.name, own.least, own.greatest),
-            lambda own=own: inputs.on_plan(case.place, own),  # type: ignore[misc]
+            (own.name, own.least, own.greatest),
         )
+        yield Claim(name, (*case.over_tube, *key), partial(inputs.on_plan, case.place, own))
+
+
+def _limited(
+    case: Case,
+    names: Sequence[str],
+    holds: Callable[[str, Fraction], Outcome],
+    beside: Mapping[str, object] | None = None,
+) -> Iterator[Claim]:
+    """Constants that have a bound keep to it; what a claim depends on `beside` that, by name."""
+    for name in names:
+        limit = case.bound_if_any(name)
+        if limit is not None:
+            told = f"{name} {'>=' if name in INFIMA else '<='} {float(limit):.6g}"
+            yield Claim(told, (*case.over_tube, limit, (beside or {}).get(name)), partial(holds, name, limit))
 
 
 def _constants(case: Case) -> Iterator[Claim]:
-    place, over = case.place, case.over_tube
-    B, upper = case.bound_if_any("B"), case.bound_if_any("upper")
-    for name in OVER_TUBE:
-        limit = case.bound_if_any(name)
-        if limit is None:
-            continue
-        relation = ">=" if name in INFIMA else "<="
-        yield Claim(
-            f"{name} {relation} {float(limit):.6g}",
-            (*over, limit, (B, upper) if name == "feedback_gain" else None),
-            lambda name=name, limit=limit: bounded(place, name, limit, largest_push(B, upper)),  # type: ignore[misc]
-        )
-    d0, H0 = case.bound_if_any("initial_distance"), case.bound_if_any("h_initial")
-    if d0 is not None:
-        yield Claim(
-            f"initial_distance <= {float(d0):.6g}",
-            (*over, d0, upper),
-            lambda: start.distance(place, d0, case.bound("upper")),
-        )
-    if H0 is not None:
-        yield Claim(f"h_initial <= {float(H0):.6g}", (*over, H0), lambda: start.uncertainty(place, H0))
-    yield from _beside(case)
-    test = case.metric.unique_geodesics
-    if test is not None and test.holds:
-        value = test.value.above
-        yield Claim(
-            "geodesics are unique",
-            (*over, value),
-            lambda: (
-                geodesics.unique(place, value)
-                if value is not None and value < 1
-                else stated(False, "the test is not below 1")
-            ),
-        )
-
-
-def _beside(case: Case) -> Iterator[Claim]:
-    """The constants of a disturbance and of unknown parameters, as far as they are bounded."""
-    place, over = case.place, case.over_tube
-    beta, eps = case.bound_if_any("metric_input_gain"), None
-    if case.system.wind is not None:
+    """Those over the tube, of the start, of a disturbance, of unknown parameters; the uniqueness of geodesics."""
+    place, s, test = case.place, case.system, case.metric.unique_geodesics
+    B, upper, beta = (case.bound_if_any(name) for name in ("B", "upper", "metric_input_gain"))
+    yield from _limited(
+        case,
+        OVER_TUBE,
+        lambda name, limit: bounded(place, name, limit, largest_push(B, upper)),
+        {"feedback_gain": (B, upper)},
+    )
+    d0, H0 = "initial_distance", "h_initial"
+    yield from _limited(case, [d0], lambda _, d: start.distance(place, d, case.bound("upper")), {d0: upper})
+    yield from _limited(case, [H0], lambda _, h: start.uncertainty(place, h))
+    if s.wind is not None:
         eps = case.bound_if_any("wind_explained")
-    matched = None if beta is None or eps is None else beta * eps
-    for name in disturbed.CONSTANTS if case.system.wind is not None else ():
-        limit = case.bound_if_any(name)
-        if limit is not None:
-            yield Claim(
-                f"{name} <= {float(limit):.6g}",
-                (*over, limit, matched),
-                lambda name=name, limit=limit: disturbed.bounded(place, name, limit, matched),  # type: ignore[misc]
-            )
-    for name in disturbed.OF_UNKNOWN if case.system.unknown is not None else ():
-        limit = case.bound_if_any(name)
-        if limit is not None:
-            yield Claim(
-                f"{name} <= {float(limit):.6g}",
-                (*over, limit),
-                lambda name=name, limit=limit: disturbed.unknown_bounded(place, name, limit),  # type: ignore[misc]
-            )
+        matched, own = None if beta is None or eps is None else beta * eps, disturbed.CONSTANTS
+        yield from _limited(
+            case, own, lambda name, q: disturbed.bounded(place, name, q, matched), dict.fromkeys(own, matched)
+        )
+    if s.unknown is not None:
+        yield from _limited(case, disturbed.OF_UNKNOWN, partial(disturbed.unknown_bounded, place))
+    if test is not None and test.holds:
+        value, name = test.value.above, "geodesics are unique"
+        if value is not None and value < 1:
+            yield Claim(name, (*case.over_tube, value), partial(geodesics.unique, place, value))
+        else:
+            yield Claim(name, (value,), partial(stated, False, "the test is not below 1"))
 
 
 def _gains(case: Case) -> Iterator[Claim]:
@@ -380,7 +342,7 @@ def _gains(case: Case) -> Iterator[Claim]:
             yield ground.claim(
                 f"{kind.key}: it says that it covers no such disturbance",
                 (section,),
-                lambda section=section, missing=missing: _silent(section, missing),  # type: ignore[misc]
+                partial(_silent, section, missing),
             )
             own = replace(ground, setting=replace(case.setting, wind=None, rest=arb(0)), silent=True)
         yield from kind.claims(section, recipes.get(kind.key), own)

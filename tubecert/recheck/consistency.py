@@ -11,6 +11,7 @@ horizon), on which set the metric is one, from which start, against which uncert
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 
 from tubecert.recheck import clearances, inputs
 from tubecert.recheck.cover import CONFIRMED, Outcome, stated
@@ -18,7 +19,7 @@ from tubecert.recheck.document import Enclosure
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.monomials import degree
 from tubecert.recheck.reasons import Assumption
-from tubecert.recheck.result import Claim, Geodesics, Plans, Result, TubeSection, Wind
+from tubecert.recheck.result import Claim, Geodesics, Result, TubeSection, Wind
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.loop import LETTERS, Disturbance
 from tubecert.recheck.specified.plant import Metric, Wanted
@@ -248,52 +249,32 @@ def _first(statements: Iterator[tuple[bool, str]]) -> Outcome:
     return CONFIRMED
 
 
-TUBE = "tube"
-_KEYS = (
-    "id",
-    "horizon",
-    "for_all_time",
-    "period",
-    "domain",
-    "start",
-    "uncertainty",
-    "plans",
-    "wind",
-    "parameters",
-)
-
-
 def own_claim(spec: Specification) -> Claim:
     """What a certificate of this specification claims; raises `ValueError` where it can claim nothing."""
-    horizon = spec.trajectory.horizon
+    plan, horizon = spec.trajectory, spec.trajectory.horizon
     for_all_time = period = None
     if horizon is None:
-        assert isinstance(spec.trajectory, (Resting, AnyPlan)), "every other plan has a horizon"
+        assert isinstance(plan, (Resting, AnyPlan)), "every other plan has a horizon"
         found = period_of(spec.uncertainty, spec.plant.moving)
         for_all_time = "periodic" if found.length else "autonomous"
         period = found.text if found.length else None
     return Claim(
-        id=TUBE,
+        id="tube",
         horizon=horizon,
         for_all_time=for_all_time,
         period=period,
         domain=spec.plant.safe_set,
         start=spec.start,
         uncertainty=spec.uncertainty.words,
-        plans=_plans(spec.trajectory) if isinstance(spec.trajectory, AnyPlan) else None,
+        plans=(plan.x, plan.u, plan.defect) if isinstance(plan, AnyPlan) else None,
         wind=None if spec.disturbance is None else Wind(spec.disturbance.length, spec.disturbance.rate),
         parameters=spec.plant.ranges or None,
     )
 
 
-def _plans(family: AnyPlan) -> Plans:
-    return Plans(x=family.x, u=family.u, defect=family.defect)
-
-
 def claimed(result: Result) -> Outcome:
     """Whether `claim` is what follows from the specification."""
     own = own_claim(result.specification)
-    for key in _KEYS:
-        if getattr(own, key) != getattr(result.claim, key):
-            return stated(False, f"claim.{key} is not that of the specification")
-    return stated(True, "")
+    names = [item.name for item in fields(Claim)]
+    other = [name for name in names if getattr(own, name) != getattr(result.claim, name)]
+    return stated(not other, f"claim.{', '.join(other)} is not that of the specification")

@@ -205,7 +205,7 @@ class Knots:
     t: tuple[Fraction, ...]
     x: tuple[tuple[Fraction, ...], ...]
     u: tuple[tuple[Fraction, ...], ...]
-    held: bool
+    held: bool = False
     inner: tuple[tuple[Fraction, tuple[Fraction, ...]], ...] = ()
 
 

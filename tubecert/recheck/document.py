@@ -347,18 +347,6 @@ def digest(data: Any) -> str:
     return "sha256:" + hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-NOT_HASHED = ("notes", "run")
-"""Members of a certificate beside its result: what they say is not examined."""
-
-
-def opened(document: Node) -> tuple[Node, str, str]:
-    """The result of a certificate, the hash that it states, and the one that the result has."""
-    own = document.closed("format", "hash", "result", *NOT_HASHED)
-    for key in NOT_HASHED:
-        own[key].mapping()
-    return own["result"], own["hash"].text(), digest(own["result"].value)
-
-
 @dataclass(frozen=True, slots=True)
 class Enclosure:
     """[below, above]; None where there is no bound."""

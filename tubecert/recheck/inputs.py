@@ -10,9 +10,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.cover import Outcome, stated, together
+from tubecert.recheck.cover import Outcome, in_turn, stated, together
 from tubecert.recheck.document import Enclosure, Node, enclosure, reads
-from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements, all_of, at_most
+from tubecert.recheck.kinds.kind import VERDICTS, Section, Shares, Statements, at_most
 from tubecert.recheck.kinds.table import KEYS
 from tubecert.recheck.place import Place
 from tubecert.recheck.specified.numbers import Range
@@ -107,7 +107,7 @@ def added(shares: Shares | None, bounds: Mapping[str, InputBound]) -> Outcome:
     if shares is None:
         return Outcome(verdict="undecided", why="this kind says nothing of inputs")
     feedback, adaptation = shares
-    return all_of(
+    return in_turn(
         outcome
         for bound in bounds.values()
         for outcome in (

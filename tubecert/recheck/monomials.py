@@ -126,8 +126,7 @@ def expanded(
     factors = list(place)
     if not factors:
         return None
-    ring = fmpq_mpoly_ctx.get([f"v{k}" for k in range(len(factors))], Ordering.lex)
-    generators = dict(zip(factors, ring.gens(), strict=True))
+    ring, generators, relations = ring_of(factors)
     value: dict[Term, Polynomial] = {}
     for term in order:
         factor = _factor(term)
@@ -135,15 +134,18 @@ def expanded(
         value[term] = found = _polynomial(term, [value[arg] for arg in term.args], known, ring)
         if found is None:
             return None
-    relations = [
-        generators[sine] ** 2 + generators[cosine] ** 2 - 1
-        for sine in factors
-        for cosine in factors
-        if sine.op == "sin" and cosine.op == "cos" and sine.args == cosine.args
-    ]
     if sum(len(value[term]) for term in outputs) > most:
         return None
     return factors, [_written(value[term], relations) for term in outputs]
+
+
+def ring_of(factors: Sequence[Term]) -> tuple[Any, dict[Term, Polynomial], list[Polynomial]]:
+    """Polynomials in factors, sines before all else: the ring, the factors in it, and every sin^2 + cos^2 - 1."""
+    ring = fmpq_mpoly_ctx.get([f"v{k}" for k in range(max(1, len(factors)))], Ordering.lex)
+    generators = dict(zip(factors, ring.gens(), strict=False))
+    pairs = [(own, other) for own in factors for other in factors if (own.op, other.op) == ("sin", "cos")]
+    circles = [pair for pair in pairs if pair[0].args == pair[1].args]
+    return ring, generators, [generators[sine] ** 2 + generators[cosine] ** 2 - 1 for sine, cosine in circles]
 
 
 def degree(outputs: Sequence[Term]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 
 from tubecert.recheck.document import Enclosure, Node, enclosure, one_of, reads
 
@@ -121,3 +121,22 @@ def _spans(edge: tuple[Point, Point], p: Point) -> bool:
     """Whether a point on the line of an edge lies on the edge."""
     (a, b) = edge
     return all(min(a[k], b[k]) <= p[k] <= max(a[k], b[k]) for k in (0, 1))
+
+
+def apart(obstacle: Obstacle, box: Sequence[tuple[Fraction, Fraction]]) -> bool:
+    """Whether a rectangle meets no edge of a polygon, or no point of a disc."""
+    if obstacle.center is not None and obstacle.radius is not None:
+        x, y = (max(a - c, c - b, Fraction(0)) for c, (a, b) in zip(obstacle.center, box, strict=True))
+        return x**2 + y**2 > obstacle.radius**2
+    return all(_missed(edge, box) for edge in pairwise((*obstacle.corners, obstacle.corners[0])))
+
+
+def _missed(edge: tuple[Point, Point], box: Sequence[tuple[Fraction, Fraction]]) -> bool:
+    """Whether an edge and a rectangle are apart along an axis, or all corners are on one side of the edge's line."""
+    if any(
+        max(ends) < low or min(ends) > high
+        for ends, (low, high) in zip(zip(*edge, strict=True), box, strict=True)
+    ):
+        return True
+    sides = [_area(*edge, (x, y)) for x, y in product(*box)]
+    return min(sides) > 0 or max(sides) < 0

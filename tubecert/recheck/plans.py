@@ -14,19 +14,10 @@ from fractions import Fraction
 
 from tubecert.recheck.balls import Ball, exact, length
 from tubecert.recheck.cover import CONFIRMED, Outcome, stated
+from tubecert.recheck.curve import Knots
 from tubecert.recheck.document import Members, Node
 from tubecert.recheck.specification import Specification
-from tubecert.recheck.specified.numbers import Numbers, Rows
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Planned, Resting, Tabled
-
-
-@dataclass(frozen=True, slots=True)
-class Knots:
-    """Exact knots of a plan, row by row."""
-
-    t: Numbers
-    x: Rows
-    u: Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +57,13 @@ def read_plan(node: Node, specification: Specification) -> Plan:
 
 
 def read_knots(own: Members, n: int, m: int, reads: Callable[[Node], Fraction]) -> Knots:
-    """`t`, `x` and `u` of an object, row by row."""
+    """`t`, `x` and `u` of an object, row by row; what lies between is not known yet."""
     t = tuple(map(reads, own["t"].entries()))
     x, u = (
         tuple(tuple(map(reads, row)) for row in own[key].rows(len(t), size))
         for key, size in (("x", n), ("u", m))
     )
-    return Knots(t, x, u)
+    return Knots(t=t, x=x, u=u)
 
 
 _MISS = Fraction(1, 1000)  # of 1 + |target|: how far from its target a planned curve may end

@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from flint import Ordering, fmpq, fmpq_mpoly_ctx
+from flint import fmpq
 
-from tubecert.recheck.monomials import Polynomial
+from tubecert.recheck.monomials import Polynomial, ring_of
 from tubecert.recheck.terms import NOUGHT, UNIT, Term, in_order, number, number_of
 
 _LARGE = 400  # terms of a polynomial
@@ -66,17 +66,8 @@ class _Cancelling:
             (term for term in order if term.op not in ("const", "add", "mul", "div", "pow")),
             key=lambda term: term.op != "sin",
         )
-        labels = [f"v{k}" for k in range(len(atoms))] or ["v0"]
-        ring = fmpq_mpoly_ctx.get(labels, Ordering.lex)
-        self._one = ring.constant(1)
-        self._atoms = atoms
-        generators = dict(zip(atoms, ring.gens(), strict=False))
-        self._relations = [
-            generators[sine] ** 2 + generators[cosine] ** 2 - 1
-            for sine in atoms
-            for cosine in atoms
-            if sine.op == "sin" and cosine.op == "cos" and sine.args == cosine.args
-        ]
+        ring, generators, self._relations = ring_of(atoms)
+        self._one, self._atoms = ring.constant(1), atoms
         self._divisors: list[Polynomial] = []
         self._value: dict[Term, _Quotient] = {}
         for term in order:

@@ -132,12 +132,8 @@ class _Told:
         for own, told, ends in zip(x, self.x, self.case.system.safe_set.values(), strict=bool(self.x)):
             self.close("the witness", told, own, ends)
 
-    def indefinite(self, rows: Rows) -> bool:
-        """Whether a matrix is not positive semidefinite at the witness, which lies in the safe set."""
-        return is_indefinite(self.value(rows))
-
     def value(self, rows: Rows) -> list[list[Ball]]:
-        """A matrix at the witness."""
+        """A matrix at the witness, which lies in the safe set."""
         ranges = self.case.system.safe_set.values()
         if not self.x or not all(lo <= x <= hi for x, (lo, hi) in zip(self.x, ranges, strict=True)):
             raise _AnotherError("the witness does not lie in the safe set")
@@ -149,10 +145,6 @@ class _Told:
 def _if(holds: bool) -> Outcome:
     why = "it could not be confirmed at the witness"
     return CONFIRMED if holds else Outcome(verdict="undecided", why=why)
-
-
-def _not_positive(told: _Told) -> Outcome:
-    return _if(told.indefinite(told.case.system.W))
 
 
 def _too_slow(told: _Told) -> Outcome:
@@ -169,7 +161,9 @@ def _too_slow(told: _Told) -> Outcome:
     forms = (
         plus(s.contraction, s.W, 2 * rate) for rate in (s.rate, largest.above + _CLOSE * abs(largest.above))
     )
-    return _if(all(told.indefinite(scaled(-1, times(turned(basis), times(form, basis)))) for form in forms))
+    return _if(
+        all(is_indefinite(told.value(scaled(-1, times(turned(basis), times(form, basis))))) for form in forms)
+    )
 
 
 def _not_killing(told: _Told) -> Outcome:
@@ -194,7 +188,7 @@ def _beyond_declared(told: _Told) -> Outcome:
         raise _AnotherError("a bound is not positive")
     bounds = [own] if reaches is None else [own, reaches * (1 + (_CLOSE if below else -_CLOSE))]
     forms = (plus(scaled(1 / a, eye), s.W, -1) if below else plus(scaled(a, s.W), eye, -1) for a in bounds)
-    return _if(all(map(told.indefinite, forms)))
+    return _if(all(is_indefinite(told.value(form)) for form in forms))
 
 
 def _leaves(told: _Told) -> Outcome:
@@ -279,7 +273,7 @@ def _plan_exceeds(told: _Told) -> Outcome:
 
 
 _FALSE: Mapping[str, Callable[[_Told], Outcome]] = {
-    "metric_definite": _not_positive,
+    "metric_definite": lambda told: _if(is_indefinite(told.value(told.case.system.W))),
     "metric_contraction": _too_slow,
     "metric_killing": _not_killing,
     "metric_bound": _beyond_declared,

@@ -18,38 +18,15 @@ from tubecert.recheck.specified.plant import Wanted
 from tubecert.recheck.specified.trajectory import Start
 
 MEASURED = (
-    "lower",
-    "upper",
-    "f",
-    "f_x",
-    "B",
-    "B_x",
-    "b_x",
-    "B_pinv",
-    "B_pinv_x",
-    "M_x",
-    "u_star",
-    "h",
-    "h_x",
-    "h_t",
-    "h_initial",
-    "feedback_gain",
-    "metric_input_gain",
-    "drift_on_plan",
-    "initial_distance",
-    "plan_defect",
+    "lower", "upper", "f", "f_x", "B", "B_x", "b_x", "B_pinv", "B_pinv_x", "M_x", "u_star", "h", "h_x", "h_t",
+    "h_initial", "feedback_gain", "metric_input_gain", "drift_on_plan", "initial_distance", "plan_defect",
     "plan_defect_metric",
-)
+)  # fmt: skip
 INFIMA = ("lower",)  # constants whose lower side is used
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plans:
-    """The family of plans that is claimed about."""
-
-    x: dict[str, Range]
-    u: dict[str, Range]
-    defect: Fraction = reads(Node.exact)
+Plans = tuple[dict[str, Range], dict[str, Range], Fraction]
+"""The family of plans that is claimed about: where x* and u* are, and the defect."""
 
 
 @dataclass(frozen=True, slots=True)

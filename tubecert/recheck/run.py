@@ -8,10 +8,10 @@ from functools import partial
 
 from tubecert.errors import ExitCode
 from tubecert.recheck import refuted
-from tubecert.recheck.certificate import read_result
+from tubecert.recheck.certificate import NOT_HASHED, opened, read_result
 from tubecert.recheck.claims import Case, of_certified, of_every
 from tubecert.recheck.cover import Claim, Memory, Outcome, stated, telling, time_is_up, within
-from tubecert.recheck.document import NOT_HASHED, SAMPLED_LOOP, Node, opened, read
+from tubecert.recheck.document import SAMPLED_LOOP, Node, read
 from tubecert.recheck.examines import not_examined
 from tubecert.recheck.result import Result
 from tubecert.recheck.sampled_loop import claims as sampled_loop

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tubecert.recheck.document import Members, Node, digest, wrong
 from tubecert.recheck.obstacles import Obstacle, read_obstacle
@@ -43,83 +43,68 @@ from tubecert.recheck.times import period_of
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Specification:
-    """A loop in continuous time; `hash` is of the canonical bytes, `content` of what a claim may rest on."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What every specification says; `hash` is of the canonical bytes."""
 
     plant: Plant
     uncertainty: Uncertainty
     trajectory: Trajectory
     start: Start
+    half_widths: dict[str, Fraction]  # at most; empty if none are asked for
+    obstacles: tuple[Obstacle, ...]
+    limits: dict[str, Range]  # by input, of some of them
+    disturbance: Disturbance | None
+    hash: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Specification(Asked):
+    """A loop in continuous time; `content` is a hash of what a claim may rest on."""
+
     metric: Metric | Wanted
     epsilon: Fraction | None  # None: with half-widths they follow from these
     rho_a: Fraction | None
     coordinates: bool  # whether the tube has coordinates of its own
-    half_widths: dict[str, Fraction]  # at most; empty if none are asked for
     loop: Loop
-    obstacles: tuple[Obstacle, ...]
-    limits: dict[str, Range]  # by input, of some of them
-    disturbance: Disturbance | None
-    hash: str
     content: str
 
 
-@dataclass(frozen=True, slots=True)
-class SampledSpecification:
-    """A loop that a computer closes, without a metric; `hash` is of the canonical bytes.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledSpecification(Asked):
+    """A loop that a computer closes, without a metric.
 
     `afterwards`: nothing (also where there is no horizon), rest or repeat. `controller`: auto or none.
     """
 
-    plant: Plant
-    uncertainty: Uncertainty
-    trajectory: Trajectory
     afterwards: str
-    half_widths: dict[str, Fraction]  # at most; empty if none are asked for
-    start: Start
-    obstacles: tuple[Obstacle, ...]
-    limits: dict[str, Range]  # by input, of some of them
     hardware: Hardware
     controller: str
-    disturbance: Disturbance | None
-    hash: str
 
 
 _ALWAYS = ("tubecert", "name", "system", "safe_set", "uncertainty", "trajectory", "initial_state", "tube")
+_OPTIONAL = ("expect", "simulation", "obstacles", "limits", "disturbance")
 
 
 def read_specification(node: Node) -> Specification:
     """That of a loop in continuous time; raises `CertificateError` for whatever is not of the canonical form."""
-    optional = (*IDLE[1:], "disturbance")
-    own = node.closed(*_ALWAYS, "adaptation", "conditions", "metric", optional=optional)
-    _version(own["tubecert"])
-    own["name"].text()
+    own = node.closed(*_ALWAYS, "adaptation", "conditions", "metric", optional=_OPTIONAL)
     plant = read_plant(own["system"], own["safe_set"])
     tube = _tube(own["tube"], plant)
-    trajectory = read_trajectory(own["trajectory"], plant)
     found = Specification(
-        plant=plant,
-        uncertainty=read_uncertainty(own["uncertainty"], plant),
-        trajectory=trajectory,
-        start=read_start(own["initial_state"], plant.states),
+        **_asked(node, own, plant, read_trajectory(own["trajectory"], plant), sampled=False),
         metric=read_metric(own["metric"], plant),
         epsilon=tube.get("epsilon", positive),
         rho_a=tube.get("rho_a", positive),
         coordinates="coordinates" in tube,
         half_widths=tube.get("half_widths", _widths) or {},
         loop=read_loop(own["adaptation"], own["conditions"]),
-        obstacles=_obstacles(own, plant),
-        limits=own.get("limits", lambda item: _some(item, plant.inputs, ends)) or {},
-        disturbance=own.get("disturbance", lambda item: read_disturbance(item, plant.states)),
-        hash=digest(node.value),
         content=digest({key: value for key, value in node.mapping().items() if key not in IDLE}),
     )
-    read_idle(own, plant)
     if plant.varies:
         _moving(own, found)
     if plant.gained is not None:
         raise own["system"].refused("has a B that is not known, which no theorem covers")
-    _startable(own, found.trajectory, found.start)
     return found
 
 
@@ -128,43 +113,46 @@ def read_sampled_specification(node: Node) -> SampledSpecification:
 
     B may depend on parameters known by ranges; f is free of t. Half-widths are at most those asked for.
     """
-    own = node.closed(*_ALWAYS, "hardware", "controller", optional=(*IDLE[1:], "disturbance"))
-    _version(own["tubecert"])
-    own["name"].text()
+    own = node.closed(*_ALWAYS, "hardware", "controller", optional=_OPTIONAL)
     plant = read_plant(own["system"], own["safe_set"])
     if plant.varies:
         raise own["system"].refused("has an f that depends on t, which a sampled loop may not have")
     wishes = own["tube"].closed(optional=("half_widths",))
     trajectory, afterwards = read_lasting(own["trajectory"], plant)
-    states = plant.states
-    found = SampledSpecification(
-        plant=plant,
-        uncertainty=read_uncertainty(own["uncertainty"], plant, sudden=True),
-        trajectory=trajectory,
+    return SampledSpecification(
+        **_asked(node, own, plant, trajectory, sampled=True),
         afterwards=afterwards,
         half_widths=wishes.get("half_widths", lambda item: _some(item, tuple(plant.lengths), positive)) or {},
-        start=read_start(own["initial_state"], states),
-        obstacles=_obstacles(own, plant),
-        limits=own.get("limits", lambda item: _some(item, plant.inputs, ends)) or {},
-        hardware=read_hardware(own["hardware"], states),
+        hardware=read_hardware(own["hardware"], plant.states),
         controller=own["controller"].word("auto", "none"),
-        disturbance=own.get("disturbance", lambda item: read_disturbance(item, states, sampled=True)),
-        hash=digest(node.value),
     )
+
+
+def _asked(
+    node: Node, own: Members, plant: Plant, trajectory: Trajectory, *, sampled: bool
+) -> dict[str, Any]:
+    """What is read alike of both; raises for a family of plans that does not start within a radius."""
+    if own["tubecert"].count() != 1:
+        said = own["tubecert"]
+        raise wrong("TC602", f"{said.path} is {said.value!r}; this version reads 1", "use a newer tubecert")
+    own["name"].text()
     read_idle(own, plant)
-    _startable(own, trajectory, found.start)
-    return found
-
-
-def _obstacles(own: Members, plant: Plant) -> tuple[Obstacle, ...]:
-    entries = own["obstacles"].entries() if "obstacles" in own else []
-    return tuple(read_obstacle(item, plant.states) for item in entries)
-
-
-def _startable(own: Members, trajectory: Trajectory, start: Start) -> None:
-    """Raises for a family of plans that does not start within a radius."""
+    start = read_start(own["initial_state"], plant.states)
     if isinstance(trajectory, AnyPlan) and start.within is None:
         raise own["initial_state"].refused("must be `within`: a family of plans has no start of its own")
+    obstacles = own.get("obstacles", lambda item: [read_obstacle(it, plant.states) for it in item.entries()])
+    return {
+        "plant": plant,
+        "uncertainty": read_uncertainty(own["uncertainty"], plant, sudden=sampled),
+        "trajectory": trajectory,
+        "start": start,
+        "obstacles": tuple(obstacles or ()),
+        "limits": own.get("limits", lambda item: _some(item, plant.inputs, ends)) or {},
+        "disturbance": own.get(
+            "disturbance", lambda item: read_disturbance(item, plant.states, sampled=sampled)
+        ),
+        "hash": digest(node.value),
+    }
 
 
 def _moving(own: Members, found: Specification) -> None:
@@ -176,11 +164,6 @@ def _moving(own: Members, found: Specification) -> None:
             raise own["system"].refused(f"cannot be examined: {error}") from None
     if not isinstance(found.metric, Metric):
         raise own["system"].refused("has an f that depends on t, beside what no theorem covers with it")
-
-
-def _version(node: Node) -> None:
-    if node.count() != 1:
-        raise wrong("TC602", f"{node.path} is {node.value!r}; this version reads 1", "use a newer tubecert")
 
 
 def _tube(node: Node, plant: Plant) -> Members:

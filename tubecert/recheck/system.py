@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -213,7 +213,7 @@ def knots_of(plan: Plan, between: str, horizon: Fraction) -> Knots:
     if plan.interpolation != between:
         raise wrong("TC603", f"{path}.interpolation is not that of the specification")
     if between != "hermite-simpson":
-        return Knots(t=t, x=knots.x, u=knots.u, held=between == "hold")
+        return replace(knots, held=between == "hold")
     if len(t) % 2 == 0:
         raise wrong(
             "TC603", f"{path}.knots must begin and end with a knot, points between knots in turn with them"

@@ -230,3 +230,18 @@ def test_what_is_not_examined_in_time_is_undecided_and_progress_is_told():
     examine(document, report=lambda *told: heard.append(told))
     assert {told[0] for told in heard} >= {"|p - p*| inside the tube", "what is added to F"}
     assert any(told[3] > 0 and 0 < told[4] < 1 for told in heard)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("until", "ends"), [("2.9", True), ("2.90001", False)])
+def test_a_stage_begins_while_the_plan_lasts(until, ends):
+    """The last stage of the tube begins at 2.9 s: no row is about it where nothing is claimed from there on."""
+    document = made(SCALAR)
+    assert document["result"]["tube"][-1]["start"] == 29
+    finite = changed(
+        document, *spec("trajectory"), to=lambda own: own | {"horizon": until, "afterwards": "nothing"}
+    )
+    finite["result"]["claim"]["horizon"] = float(until)
+    if ends:
+        finite["result"]["tube"][-1]["half_widths"]["x"] = 1e-9
+    assert why_not(resealed(finite)) == ["the plan is that of the specification, and lasts"] * ends

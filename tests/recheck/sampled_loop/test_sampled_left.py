@@ -10,8 +10,9 @@ from sampled_files import CART, SCALAR, changed, made, why_not
 from small_loops import AT_ONE, RANGE, WAVE, scalar, text_of
 
 from tubecert.recheck.cover import CONFIRMED
+from tubecert.recheck.curve import Knots
 from tubecert.recheck.document import Node
-from tubecert.recheck.plans import Knots, Plan
+from tubecert.recheck.plans import Plan
 from tubecert.recheck.sampled_loop.claims import Case
 from tubecert.recheck.sampled_loop.record import Proven, Recipe, Stage, read_result
 from tubecert.recheck.sampled_loop.remainders import Remainders, Size, course_of
@@ -70,7 +71,8 @@ SILENT = arb_mat(0, 0), arb_mat(0, 1), arb_mat(1, 0), arb_mat([[0]])
 BENT = scalar("0", "1 + 0.1*x")
 RESTING = "{kind: equilibrium, at: [0], input: [0], horizon: 4}"
 THROUGH = "{kind: ilqr, start: [0], target: [2], horizon: 2, knots: 3, goal: false}"
-KNOTS = Knots(*(tuple(map(Fraction, (0, 1, 2))), *(((Fraction(0),), (Fraction(1),), (Fraction(2),)),) * 2))
+ROWS = ((Fraction(0),), (Fraction(1),), (Fraction(2),))
+KNOTS = Knots(t=tuple(map(Fraction, (0, 1, 2))), x=ROWS, u=ROWS)
 KNOWN = "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"
 
 

@@ -9,14 +9,13 @@ from typing import ClassVar
 
 from tubecert.recheck.balls import Ball, exact, root
 from tubecert.recheck.conditions import Setting, margin
-from tubecert.recheck.cover import Claim, Outcome, stated
+from tubecert.recheck.cover import Claim, Outcome, in_turn, stated
 from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
 from tubecert.recheck.kinds.kind import (
     Ground,
     Kind,
     Section,
     Shares,
-    all_of,
     at_least,
     at_most,
     margin_at_least,
@@ -114,7 +113,7 @@ def _reaches(top: Fraction, ground: Ground) -> Outcome:
     d0 = ground.constants["initial_distance"].above
     started = stated(d0 is not None and d0 <= top, "it is less than d0")
     end = _at_the_end(ground.setting, ground.setting.n.h)
-    return all_of((started, at_most(end, top, "sup D without adaptation")))
+    return in_turn((started, at_most(end, top, "sup D without adaptation")))
 
 
 def _holds(section: AloneSection, recipe: NoGains | None, setting: Setting) -> Outcome:
@@ -128,7 +127,7 @@ def _holds(section: AloneSection, recipe: NoGains | None, setting: Setting) -> O
     if radius is None:
         return own
     last = settled(setting, setting.n.h) / root(setting.n.lower)
-    return all_of((own, at_most(last, radius, "the ultimate radius")))
+    return in_turn((own, at_most(last, radius, "the ultimate radius")))
 
 
 def _told(section: AloneSection, setting: Setting) -> Outcome:
@@ -146,4 +145,4 @@ def _serves(limit: Fraction, setting: Setting) -> Outcome:
     """Whatever |h| is below the limit, sup D < dbar: D rises with h, and d0 < dbar by itself, theory 4a."""
     started = stated(bool(setting.n.initial_distance < setting.reach), "d0 is not below dbar")
     reached = at_most(supremum(setting, exact(limit)) / setting.reach, Fraction(1), "sup D/dbar at that |h|")
-    return all_of((started, reached))
+    return in_turn((started, reached))

@@ -18,7 +18,7 @@ from tubecert.recheck.conditions import (
     margin,
     own_distance_proof,
 )
-from tubecert.recheck.cover import Claim, Outcome, stated
+from tubecert.recheck.cover import Claim, Outcome, in_turn, stated
 from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
 from tubecert.recheck.kinds.kind import (
     Asked,
@@ -27,7 +27,6 @@ from tubecert.recheck.kinds.kind import (
     Section,
     Shares,
     Statements,
-    all_of,
     margin_at_least,
     no_radius,
     not_shown_to_hold,
@@ -182,7 +181,7 @@ def _told(pair: DistancePair, setting: Setting) -> Outcome:
     if pair.ultimate_radius is not None:
         return no_radius()
     true = told(_own_margin(setting, pair), pair.margin, "the distance")
-    return all_of((true, not_shown_to_hold([pair.margin])))
+    return in_turn((true, not_shown_to_hold([pair.margin])))
 
 
 def _agreed(section: DistanceSection, radius: Fraction) -> Outcome:

@@ -115,11 +115,6 @@ class Kind(ABC, Generic[S, R]):
         return None
 
 
-def all_of(outcomes: Iterable[Outcome]) -> Outcome:
-    """The first that is not confirmed."""
-    return next((item for item in outcomes if not item.holds), CONFIRMED)
-
-
 def margin_at_least(value: Ball, printed: Enclosure, what: str) -> Outcome:
     """A margin: proven to be at least the lower end that is printed, which is positive."""
     below = printed.below

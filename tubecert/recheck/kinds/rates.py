@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import ClassVar
 
 from tubecert.recheck.conditions import Gains, Setting, derived, margins_26, own_distance_proof
-from tubecert.recheck.cover import Claim, Outcome, stated
+from tubecert.recheck.cover import Claim, Outcome, in_turn, stated
 from tubecert.recheck.document import Enclosure, Node, enclosure, maybe, nullable, reads
 from tubecert.recheck.kinds.kind import (
     Asked,
@@ -17,7 +17,6 @@ from tubecert.recheck.kinds.kind import (
     Section,
     Shares,
     Statements,
-    all_of,
     at_most,
     margin_at_least,
     no_radius,
@@ -29,18 +28,9 @@ from tubecert.recheck.kinds.kind import (
 
 CONDITIONS = ("26a", "26b", "26c")
 DERIVED = (
-    "speed",
-    "uncertainty_rate",
-    "prediction_error",
-    "filter_error",
-    "theta",
-    "Psi_x",
-    "geodesic_rate",
-    "Psi_rate",
-    "zeta_1",
-    "zeta_2",
-    "zeta_3",
-)
+    "speed", "uncertainty_rate", "prediction_error", "filter_error", "theta", "Psi_x", "geodesic_rate", "Psi_rate",
+    "zeta_1", "zeta_2", "zeta_3",
+)  # fmt: skip
 
 Margins = dict[str, Enclosure]
 
@@ -162,14 +152,14 @@ def _of_pair(section: RateSection, pair: RatePair, recipe: Gains | None, ground:
 def _margins_hold(pair: RatePair, setting: Setting) -> Outcome:
     """(26a)-(26c) hold with the margins printed."""
     found = margins_26(setting, pair)
-    return all_of(margin_at_least(found[claim], pair.margins[claim], f"({claim})") for claim in found)
+    return in_turn(margin_at_least(found[claim], pair.margins[claim], f"({claim})") for claim in found)
 
 
 def _told(pair: RatePair, ground: Ground) -> Outcome:
     """The margins printed of what is not certified: each is true, and not all are positive but for a disturbance."""
     found = margins_26(ground.setting, pair)
-    true = all_of(told(found[claim], pair.margins[claim], f"({claim})") for claim in found)
-    return true if ground.silent else all_of((true, not_shown_to_hold(pair.margins.values())))
+    true = in_turn(told(found[claim], pair.margins[claim], f"({claim})") for claim in found)
+    return true if ground.silent else in_turn((true, not_shown_to_hold(pair.margins.values())))
 
 
 def _radius_holds(section: RateSection, radius: Fraction, setting: Setting) -> Outcome:
@@ -184,4 +174,4 @@ def _derived_hold(constants: dict[str, Enclosure], setting: Setting, at: Gains) 
     """The derived constants at these gains; one without a bound claims nothing."""
     found = derived(setting, at)
     tops = {name: top for name in found if (top := constants[name].above) is not None}
-    return all_of(at_most(found[name], top, name) for name, top in tops.items())
+    return in_turn(at_most(found[name], top, name) for name, top in tops.items())

@@ -6,7 +6,6 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property, partial
-from itertools import pairwise
 from math import ceil, inf, isfinite
 
 from flint import arb, arb_mat
@@ -17,7 +16,7 @@ from tubecert.recheck.cover import CONFIRMED, Claim, Outcome, stated, together
 from tubecert.recheck.cover import Range as Ends
 from tubecert.recheck.curve import Segment
 from tubecert.recheck.metric import smooth
-from tubecert.recheck.obstacles import Obstacle, Point
+from tubecert.recheck.obstacles import apart
 from tubecert.recheck.plans import serves
 from tubecert.recheck.sampled_loop.record import Proven, Result, single
 from tubecert.recheck.sampled_loop.remainders import PLAN, Course, Remainders, Size, Slow, course_of
@@ -153,11 +152,14 @@ class Case:
         return stated(all(single(x) == x for x in flat), "an entry is no number of single precision")
 
     def plan(self) -> Outcome:
-        """The knots are those of its task, and the plan goes on as is said."""
-        task = self._spec.trajectory
+        """The knots are those of its task, the plan goes on as is said, and no stage begins after its end."""
+        task, horizon, last = self._spec.trajectory, self.course.horizon, self._proven.stages[-1].start
         found = serves(task, self._proven.plan) if isinstance(task, Planned) else CONFIRMED
         why = "it is not over, or not where it began, when it begins again"
-        return together([found, stated(self.course.goes_on, why)])
+        met = horizon is None or last * self._spec.hardware.sample_time < horizon
+        return together(
+            [found, stated(self.course.goes_on, why), stated(met, "a stage begins after its end")]
+        )
 
     def smooth(self) -> Outcome:
         """What everything owes is kept on the safe set, and along the plan."""
@@ -207,7 +209,7 @@ class Case:
             if not all(isfinite(low) and isfinite(high) for _, low, high in sides):
                 return False
             box = [(Fraction(low) - widths[i], Fraction(high) + widths[i]) for i, low, high in sides]
-            return _apart(obstacle, box)
+            return apart(obstacle, box)
 
         return along(self.course.curve.root, self._budget, clear)
 
@@ -228,19 +230,3 @@ def _within(ends: Range, planned: Iterable[Ball], more: Ball) -> Outcome:
     if all(low <= x - more and x + more <= high for x in planned):
         return CONFIRMED
     return Outcome(verdict="undecided", why="it may leave it")
-
-
-def _apart(obstacle: Obstacle, box: Sequence[Range]) -> bool:
-    if obstacle.center is not None and obstacle.radius is not None:
-        away = [max(a - c, c - b, Fraction(0)) for c, (a, b) in zip(obstacle.center, box, strict=True)]
-        return away[0] ** 2 + away[1] ** 2 > obstacle.radius**2
-    corners = obstacle.corners
-    return all(_missed(a, b, box) for a, b in pairwise((*corners, corners[0])))
-
-
-def _missed(a: Point, b: Point, box: Sequence[Range]) -> bool:
-    """Whether an edge misses a rectangle: they are apart along an axis, or all corners are on one side of its line."""
-    if any(max(a[k], b[k]) < box[k][0] or min(a[k], b[k]) > box[k][1] for k in (0, 1)):
-        return True
-    sides = [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) for x in box[0] for y in box[1]]
-    return min(sides) > 0 or max(sides) < 0

@@ -23,8 +23,9 @@ from typing import Final
 from flint import arb, ctx
 
 from tubecert.recheck.balls import Ball, floor, power
+from tubecert.recheck.certificate import opened
 from tubecert.recheck.cover import Outcome, stated
-from tubecert.recheck.document import Node, opened
+from tubecert.recheck.document import Node
 from tubecert.recheck.program import Program
 from tubecert.recheck.sampled_loop.record import Proven, Result, read_result, single
 from tubecert.recheck.sampled_loop.remainders import Course, course_of
@@ -177,7 +178,7 @@ class HeldPlan:
         )
         self.formula, self._computed = self._compute(x, u) if self._goes_on else (("", ""), [])
 
-    def _compute(self, x: Sequence[str], u: Sequence[str]) -> tuple[tuple[str, str], list[list[Ball]]]:
+    def _compute(self, x: Sequence[str], u: Sequence[str]) -> tuple[tuple[str, ...], list[list[Ball]]]:
         """The formula, and what it gives where it is looked at."""
         machine, rounds = self._course.spec.hardware, Ball(1, 2.0**-53)
         with ctx.workprec(53):
@@ -188,7 +189,9 @@ class HeldPlan:
         rows = [list(row) for row in zip(*(values for _, values in (*xs, *us)), strict=True)]
         if machine.arithmetic == "single":
             rows = [[Ball(single(float(v.mid())), v.rad()) for v in row] for row in rows]
-        return (_lines("xs", xs), _lines("us", us)), rows
+        said = ((name, enumerate(own)) for name, own in (("xs", xs), ("us", us)))
+        lines = ("\n".join(f"  {name}[{i}] = (real){text};" for i, (text, _) in own) for name, own in said)
+        return tuple(lines), rows
 
     def _at(self, t: Fraction) -> tuple[list[Ball], list[Ball]]:
         """x* (n) and u* (m) at a time; of a family 0."""
@@ -214,10 +217,6 @@ class HeldPlan:
             if not all(abs(a - b) <= size * _ACCURACY for a, b, size in near):
                 return f"the plan of sample {k} is not that of the certificate"
         return ""
-
-
-def _lines(name: str, said: Sequence[tuple[str, list[Ball]]]) -> str:
-    return "\n".join(f"  {name}[{i}] = (real){text};" for i, (text, _) in enumerate(said))
 
 
 def _in_c(node: ast.expr, t: list[Ball]) -> tuple[str, list[Ball]]:

@@ -28,7 +28,6 @@ from tubecert.recheck.balls import (
     floor,
     joined,
     length,
-    parted,
     picked,
     sizes,
 )
@@ -311,15 +310,15 @@ class Remainders:
         found = [] if self._sudden else self._uncertain(W)
         wind = self._spec.disturbance
         if wind is not None and wind.rate is not None:
-            own, rate = zip(_columns(self._E), self._gusts.each, strict=True), exact(wind.rate)
+            own, rate = zip(self._E.transpose().tolist(), self._gusts.each, strict=True), exact(wind.rate)
             found += [Slow(e, size, rate, size) for e, size in own]
         if self._slow:
-            units = _columns(picked(range(self._n), self._n))
+            units = picked(range(self._n), self._n).tolist()
             found += [Slow(units[i], size, rate, size) for i, (size, rate) in self._strangeness.items()]
         return found
 
     def _uncertain(self, W: Sequence[Ball]) -> list[Slow]:
-        given, columns = self._spec.uncertainty, _columns(self._B)
+        given, columns = self._spec.uncertainty, self._B.transpose().tolist()
         if given.h is None:
             size, steep, fast = (exact(given.declared[key]) for key in ("h", "h_x", "h_t"))
             (speed,) = tops([length([x.abs_upper() for x in own.speed])] for own in self.windows)
@@ -396,7 +395,8 @@ class Remainders:
             values = self._slopes.run([*x, *u, *self._parameters])
             off = sizes(arb_mat(n, n + m, values[: n * (n + m)]) - nominal)
             total += off * weights
-        total = total / _STEPS + parted(off, n)[1] * column(acting)
+        of_u = arb_mat(n, m, [x for row in off.tolist() for x in row[n:]])
+        total = total / _STEPS + of_u * column(acting)
         shaken = (arb_mat(n, k, values[n * (n + m) :]) - self._E).tolist()
         return [x + self._gusts.through(row) for x, row in zip(total.entries(), shaken, strict=True)]
 
@@ -415,10 +415,6 @@ def _gradients(rows: Sequence[Term], by: Sequence[str]) -> list[Term]:
     """The slopes of every row, row by row."""
     columns = [slopes(rows, name) for name in by]
     return [e for row in zip(*columns, strict=True) for e in row]
-
-
-def _columns(a: arb_mat) -> list[list[Ball]]:
-    return a.transpose().tolist()
 
 
 def _wider(x: Sequence[Ball], by: Sequence[Ball]) -> list[Ball]:

@@ -55,6 +55,8 @@ class Loop:
         )
         e, zeta, *waiting, _, heard, rounded, lost = self.parts
         self.sent = [N * (e + heard) + M * zeta + rounded, *waiting]
+        known = picked(range(self.width), self.size)
+        self.without_heard = known.transpose() * known
         self._kept = G * (e + heard) + F * zeta + lost
 
     def flow(self, t: Ball, order: int = 0) -> arb_mat:
@@ -85,12 +87,6 @@ class Loop:
         """Rows of xi_(k+1), AA and NN beside one another; of what is heard then, nothing."""
         moved, none = self.error(exact(self.sample), later=True), arb_mat(self.size - self.width, self.size)
         return stacked([moved, self._kept, *self.sent[:-1], self.parts[-4], none])
-
-    @property
-    def without_heard(self) -> arb_mat:
-        """Rows times it are those without what is heard."""
-        known = picked(range(self.width), self.size)
-        return known.transpose() * known
 
 
 @dataclass(frozen=True)
@@ -306,11 +302,7 @@ class Inequalities:
         loop, n, r = self.loop, len(self.error), len(self.slow)
         with ctx.workprec(_SETUP_BITS):
             nodes = [loop.error(exact(s), later=s >= loop.rest) for s in self.nodes]
-            q, step, without_heard = (
-                stacked([*nodes, loop.sent[0], loop.parts[1]]),
-                loop.step,
-                loop.without_heard,
-            )
+            q, step = stacked([*nodes, loop.sent[0], loop.parts[1]]), loop.step
             acting = [self._within(self._kernels(s)) for s in self.nodes]
             found = stacked([*acting, arb_mat(q.nrows() - n * len(nodes), len(self.phases))])
             kernels = self._kernels(loop.sample)
@@ -325,7 +317,7 @@ class Inequalities:
                 raise ArithmeticError("the time was up")
             if lag % _TELLS == 0 and (tell := told()) is not None:
                 tell(lag, lag / (lags + 1))
-            rows = q.mid() * without_heard
+            rows = q.mid() * loop.without_heard
             missed = q - rows
             for place, entry in owed.items():
                 missed[place] = entry
