@@ -14,6 +14,7 @@ from tubecert import certificate, pipeline
 from tubecert.certificate.result import Certificate
 from tubecert.errors import ExitCode, TargetError, TubecertError
 from tubecert.files import Kind, read
+from tubecert.findings import Finding
 from tubecert.libraries import versions
 from tubecert.printable import printable_json, visible
 from tubecert.records import FormError, from_json, to_json
@@ -66,22 +67,16 @@ class Point:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Problem:
-    """A finding, without its place: that is the point."""
-
-    code: str
-    message: str
-    help: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Failed:
-    """Why a point has no certificate: its specification is not valid (2), or tubecert has a defect (3)."""
+    """Why a point has no certificate: its specification is not valid (2), or tubecert has a defect (3).
+
+    Of findings, without their places: that is the point.
+    """
 
     format: str
     settings: Mapping[str, str]
     exit_code: int
-    problems: tuple[Problem, ...]
+    problems: tuple[Finding, ...]
 
     @property
     def broken(self) -> bool:
@@ -104,18 +99,14 @@ def certify_point(task: Task, point: Point) -> None:
     try:
         text = _certificate(task, point)
     except TubecertError as error:
-        _keep_failed(
-            task,
-            point,
-            error.exit_code,
-            [Problem(code=f.code, message=f.message, help=f.help) for f in error.findings],
-        )
+        problems = [replace(finding, location=None) for finding in error.findings]
+        _keep_failed(task, point, error.exit_code, problems)
         return
     except MemoryError:
         raise
     except Exception as error:
         words = f"internal error: {type(error).__name__}: {visible(' '.join(str(error).split())[:200])}"
-        _keep_failed(task, point, ExitCode.INTERNAL, [Problem(code="", message=words)])
+        _keep_failed(task, point, ExitCode.INTERNAL, [Finding(code="", message=words)])
         return
     _write(certificate_file(task.folder, point), text)
     error_file(task.folder, point).unlink(missing_ok=True)
@@ -165,7 +156,7 @@ def outcome(task: Task, point: Point) -> Kept | None:
     return found if settings == wanted else None
 
 
-def _keep_failed(task: Task, point: Point, code: ExitCode, problems: list[Problem]) -> None:
+def _keep_failed(task: Task, point: Point, code: ExitCode, problems: list[Finding]) -> None:
     failed = Failed(
         format=ERROR_FORMAT,
         settings={each.path: each.text for each in (*task.fixed, *point.settings)},
