@@ -23,7 +23,7 @@ from texts import ROOT
 import tubecert as tc
 from tubecert import asking
 from tubecert.letters import NAMES
-from tubecert.pipeline.counting import claims_of
+from tubecert.pipeline.listening import claims_of
 
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 TEXT = FLAT.replace("name: flat", "name: cart").replace("[u],", "[u], units: {p: m<b>, v: m/s},")

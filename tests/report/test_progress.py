@@ -8,7 +8,7 @@ import pytest
 from texts import CONFIGS
 
 from tubecert.kinds import NAMES
-from tubecert.pipeline.counting import Claims, claims_of
+from tubecert.pipeline.listening import Claims, claims_of
 from tubecert.progress import Phase, Step, Unit
 from tubecert.report.progress import Log, Pieces, Timed, shown
 from tubecert.report.terminal import Terminal

@@ -6,12 +6,12 @@ In: a `Spec` and `Options`. Out: the `Result` of a certificate, for every verdic
 |---|---|
 | `checks` | what makes the question meaningless, as findings |
 | `certification` | stage after stage, with what planners and searches propose |
-| `counting` | how many claims of how many are done |
 | `gaps` | how closely each constant is enclosed, where its effect decides |
 | `reasons` | why a verdict about gains is what it is |
 | `synthesis`, `synthesised` | a metric where none is given: objectives, its file |
 | `unfound` | why there is none, and what would help |
-| `climb`, `candidates`, `deadline` | rates from slow to fast, what each comes to in the end, and when to stop |
+| `climb`, `candidates` | rates from slow to fast, and what each comes to in the end |
+| `listening` | who hears of a search, and until when it goes on |
 """
 
 from __future__ import annotations
@@ -25,8 +25,7 @@ from tubecert.letters import ALONE
 from tubecert.metric.verify import Proofs
 from tubecert.pipeline.certification import answer, question_of, result
 from tubecert.pipeline.checks import inspect, missing_sections, sound_time, unsearchable
-from tubecert.pipeline.counting import counted
-from tubecert.pipeline.deadline import Deadline, Listeners
+from tubecert.pipeline.listening import Deadline, Listeners, counted
 from tubecert.progress import Progress
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.question import Memory, Options, Question, Stopped, overridden

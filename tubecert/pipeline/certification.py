@@ -17,8 +17,8 @@ from tubecert.conditions.problem import TubeProblem
 from tubecert.kinds.table import KINDS, kind_of
 from tubecert.lint.codes import NOTABLE_DEFECT
 from tubecert.pipeline.checks import missing_parts, sound_time
-from tubecert.pipeline.counting import tell_gains
 from tubecert.pipeline.gaps import enclosed
+from tubecert.pipeline.listening import tell_gains
 from tubecert.pipeline.reasons import input_reasons, obstacle_reasons, reasons
 from tubecert.progress import Progress
 from tubecert.search.coordinates import Wish, propose

@@ -20,7 +20,7 @@ from tubecert.claims.statements import HalfWidthFits, TubeInSafeSet, TubeRadius
 from tubecert.enclosure.constant import round_down
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel
-from tubecert.pipeline.deadline import Cut
+from tubecert.pipeline.listening import Cut
 from tubecert.pipeline.synthesised import Row
 from tubecert.spec import Spec
 from tubecert.synthesis.problem import FLOORS, Floor

@@ -44,7 +44,7 @@ from tubecert.pipeline.candidates import judged_row, measured_in
 from tubecert.pipeline.certification import question_of
 from tubecert.pipeline.checks import missing_radii
 from tubecert.pipeline.climb import Climb, pace, slow_scale
-from tubecert.pipeline.deadline import Cut, Deadline, Listeners, OutOfTime, cut_by
+from tubecert.pipeline.listening import Cut, Deadline, Listeners, OutOfTime, cut_by
 from tubecert.pipeline.synthesised import Row, Synthesised, TooLongError, file_of, read_back, shorter
 from tubecert.pipeline.unfound import (
     equilibria,
