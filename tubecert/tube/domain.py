@@ -65,53 +65,31 @@ class Tube:
         return bool(free_symbols([curve for name, curve in curves if name in needed]))
 
     def boxes(self, variables: tuple[str, ...]) -> tuple[Array, Array]:
-        """Boxes around the plan, window by window of time if there are inputs: these are known through time only."""
-        others = self._others(variables)
-        free_lo, free_hi = self._free.boxes(others)
-        if PIECE in variables:
-            lo, hi = self._piecewise(variables, others, free_lo, free_hi)
-            lo, hi, _ = self.contract(variables, lo, hi)
-            return lo, hi
+        """Boxes around the plan: one for every piece of it, or for every window of time if there are inputs.
+
+        These are known through time only; states and inputs are unbounded at first.
+        """
+        others, spans = self._others(variables), self._plan.spans if PIECE in variables else None
+        windows = _WINDOWS if TIME in others and any(v in self._inputs for v in variables) else 1
+        count = windows if spans is None else len(spans.lo)
+        free_lo, free_hi = (np.repeat(end, count, axis=0) for end in self._free.boxes(others))
         if TIME in others:
             column = others.index(TIME)
-            windows = _WINDOWS if any(v in self._inputs for v in variables) else 1
             edges = np.linspace(free_lo[0, column], free_hi[0, column], windows + 1)
-            free_lo, free_hi = np.repeat(free_lo, windows, axis=0), np.repeat(free_hi, windows, axis=0)
-            free_lo[:, column], free_hi[:, column] = edges[:-1], edges[1:]
-        lo, hi = (
-            np.full((len(free_lo), len(variables)), -np.inf),
-            np.full((len(free_lo), len(variables)), np.inf),
-        )
-        for source, name in enumerate(others):
-            lo[:, variables.index(name)], hi[:, variables.index(name)] = (
-                free_lo[:, source],
-                free_hi[:, source],
-            )
+            early, late = (edges[:-1], edges[1:]) if spans is None else (spans.lo, spans.hi)
+            free_lo[:, column] = np.maximum(free_lo[:, column], early)
+            free_hi[:, column] = np.minimum(free_hi[:, column], late)
+        lo, hi = np.full((count, len(variables)), -np.inf), np.full((count, len(variables)), np.inf)
+        own = [variables.index(name) for name in others]
+        lo[:, own], hi[:, own] = free_lo, free_hi
+        if spans is not None:
+            lo[:, variables.index(PIECE)] = hi[:, variables.index(PIECE)] = np.arange(count)
         lo, hi, _ = self.contract(variables, lo, hi)
         return lo, hi
 
     def _others(self, variables: tuple[str, ...]) -> tuple[str, ...]:
         """Time and what is independent of the plan."""
         return tuple(v for v in variables if v not in (*self._states, *self._inputs, PIECE))
-
-    def _piecewise(
-        self, variables: tuple[str, ...], others: tuple[str, ...], free_lo: Array, free_hi: Array
-    ) -> tuple[Array, Array]:
-        """One box for every piece of the plan, unbounded in states and inputs."""
-        spans = self._plan.spans
-        assert spans is not None
-        count = len(spans.lo)
-        lo, hi = np.full((count, len(variables)), -np.inf), np.full((count, len(variables)), np.inf)
-        for source, name in enumerate(others):
-            column = variables.index(name)
-            lo[:, column], hi[:, column] = free_lo[0, source], free_hi[0, source]
-        column = variables.index(TIME)
-        lo[:, column], hi[:, column] = (
-            np.maximum(lo[:, column], spans.lo),
-            np.minimum(hi[:, column], spans.hi),
-        )
-        lo[:, variables.index(PIECE)] = hi[:, variables.index(PIECE)] = np.arange(count)
-        return lo, hi
 
     def contract(
         self, variables: tuple[str, ...], lo: Array, hi: Array
