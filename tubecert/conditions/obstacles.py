@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ def obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
     """What no gains can overcome: dbar <= d0, dbar <= delta/lambda."""
     safe, whole = problem.proven(), problem.enclosed()
     allowed = reach(safe), reach(whole)
-    items = (_obstacle("initial_distance", allowed, (safe.d0, whole.d0)), _pushes(problem, allowed))
+    items = (obstacle("initial_distance", allowed, (safe.d0, whole.d0)), _pushes(problem, allowed))
     return tuple(item for item in items if item is not None)
 
 
@@ -34,7 +35,7 @@ def _pushes(problem: TubeProblem, allowed: tuple[Interval, Interval]) -> Shortfa
     if problem.wind is not None:
         causes["wind"] = problem
     for claim, each in causes.items():
-        found = _obstacle(claim, allowed, (_residual(each.proven()), _residual(each.enclosed())))
+        found = obstacle(claim, allowed, (_residual(each.proven()), _residual(each.enclosed())))
         if found is not None:
             return found
     return None
@@ -59,9 +60,7 @@ def _residual(n: Numbers[Interval]) -> Interval:
     return still.supremum()
 
 
-def _obstacle(
-    claim: str, allowed: tuple[Interval, Interval], needed: tuple[Interval, Interval]
-) -> Shortfall | None:
+def obstacle(claim: str, allowed: Sequence[Interval], needed: Sequence[Interval]) -> Shortfall | None:
     """The reason, unless allowed > needed is proven; both on the safe side first, then enclosed, theory 4.2."""
     low, high = (1 - x / y for x, y in zip(needed, allowed, strict=True))
     if low.lo > 0:

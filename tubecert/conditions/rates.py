@@ -17,7 +17,7 @@ from tubecert.bounds.constants import Constant
 from tubecert.conditions.arithmetic import Array, T, choose, nothing, quiet, sqrt, vector
 from tubecert.conditions.inputs import InputShares, shares
 from tubecert.conditions.kernels import tight_kernel
-from tubecert.conditions.obstacles import reach
+from tubecert.conditions.obstacles import obstacle, reach
 from tubecert.conditions.problem import Numbers, Shortfall, TubeProblem
 from tubecert.conditions.theorem import LoopGains, Theorem
 from tubecert.conditions.wind import not_covered, prediction_error, provisos
@@ -174,22 +174,13 @@ def _at_once(problem: TubeProblem, n: Numbers[Array]) -> object:
 
 def _obstacles(problem: TubeProblem) -> tuple[Shortfall, ...]:
     """Why no bandwidth serves, if so: the initial error and the plan's defect alone need rho_r^2 <= E0/a + zeta_p."""
-    margins, needed = [], []
+    allowed, needed = [], []
     for n in (problem.proven(), problem.enclosed()):
         terms = rate_terms(n)
         needed.append(terms.E0 / n.a + terms.zeta_p)
-        margins.append(1 - needed[-1] / n.rho_r**2)
-    low, high = margins
-    if low.lo > 0:
-        return ()
-    return (
-        Shortfall(
-            claim="26a",
-            margin=Interval(low.lo, np.maximum(low.lo, high.hi)),
-            allowed=float((problem.proven().rho_r ** 2).lo),
-            needed=float(needed[0].hi),
-        ),
-    )
+        allowed.append(n.rho_r**2)
+    found = obstacle("26a", allowed, needed)
+    return () if found is None else (found,)
 
 
 def _provisos(problem: TubeProblem) -> tuple[Shortfall, ...]:
