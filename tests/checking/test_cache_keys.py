@@ -8,7 +8,7 @@ from systems import SMALL
 from texts import ROOT
 
 from tubecert.checking import cache
-from tubecert.spec import Setting, canonical, load, load_question
+from tubecert.spec import Setting, canonical, load
 from tubecert.spec.load import load_source
 from tubecert.spec.source import Source
 
@@ -43,7 +43,7 @@ def key(spec):
 
 @pytest.mark.parametrize("path", SPECIFICATIONS, ids=lambda path: path.stem)
 def test_every_value_counts(path, monkeypatch):
-    spec = load_question(str(path))
+    spec = load(str(path), reads="question")
     effective = canonical(spec)
     before = key(spec)
     assert "safe_set" in effective

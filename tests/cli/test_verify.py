@@ -14,7 +14,7 @@ from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.errors import SpecError
 from tubecert.model import build
 from tubecert.pipeline.verification import verify
-from tubecert.spec.load import load_system
+from tubecert.spec import load
 from tubecert.spec.metric_file import with_metric
 from tubecert.verdict import Verdict
 
@@ -175,7 +175,7 @@ WRITERS = {
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_every_format_is_the_same_metric(folder, name):
-    spec = load_system(str(folder / "bent.yaml"))
+    spec = load(str(folder / "bent.yaml"), reads="system")
     W = [["1 + 0.25*x**2", "-0.5"], ["-0.5", "2 + 0.125*x**2"]]
     written = {"format": "tubecert-metric/1", "rate": 1, "dual_metric": W}
     reference = with_metric(spec, str(_json(folder, written, "reference.json")))
@@ -187,7 +187,7 @@ def test_every_format_is_the_same_metric(folder, name):
 
 
 def test_floats_are_their_shortest_decimals_and_texts_are_exact(folder):
-    spec = load_system(str(folder / "bent.yaml"))
+    spec = load(str(folder / "bent.yaml"), reads="system")
     third = _json(folder, {"coefficients": [["1/3", "0"], ["0", 1]], "rate": 0.1})
     metric = with_metric(spec, str(third)).metric
     assert str(metric.dual_metric[0][0].expression.fraction) == "1/3"
@@ -196,7 +196,7 @@ def test_floats_are_their_shortest_decimals_and_texts_are_exact(folder):
 
 
 def test_a_csv_of_numbers_alone_is_a_constant_dual_metric(folder):
-    spec = load_system(str(folder / "bent.yaml"))
+    spec = load(str(folder / "bent.yaml"), reads="system")
     found = with_metric(spec, str(_text(folder, "rows.csv", "1e0, -0.5\n-0.5,2\n")), 1)
     rows = [[str(e.expression.fraction) for e in row] for row in found.metric.dual_metric]
     assert rows == [["1", "-1/2"], ["-1/2", "2"]]
@@ -205,7 +205,7 @@ def test_a_csv_of_numbers_alone_is_a_constant_dual_metric(folder):
 
 
 def test_an_asymmetry_of_rounding_is_mended_and_no_other(folder):
-    spec = load_system(str(folder / "bent.yaml"))
+    spec = load(str(folder / "bent.yaml"), reads="system")
     array = np.array([[1.0, -0.5], [-0.5 + 1e-15, 2.0]])
     W = with_metric(spec, str(_npz(folder, coefficients=array, rate=1.0))).metric.dual_metric
     assert W[0][1].expression is W[1][0].expression

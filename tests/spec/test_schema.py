@@ -19,7 +19,7 @@ import tubecert
 from tubecert import certificate, spec
 from tubecert.certificate.result import Certificate
 from tubecert.spec.keys import Section
-from tubecert.spec.load import FILE, load_question, load_text
+from tubecert.spec.load import FILE, load, load_text
 from tubecert.spec.plan import PLANS
 
 PACKAGE = Path(tubecert.__file__).parent
@@ -87,7 +87,7 @@ def test_good_files_fit(path):
 
 @pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
 def test_the_effective_specification_fits(path):
-    assert not errors("spec", spec.canonical(load_question(str(path))))
+    assert not errors("spec", spec.canonical(load(str(path), reads="question")))
 
 
 @pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
@@ -142,7 +142,7 @@ def test_every_section_of_the_table_is_read(monkeypatch):
 
     monkeypatch.setattr(Section, "entries", entries)
     for path in GOOD:
-        load_question(str(path))
+        load(str(path), reads="question")
     load_text(EVERYTHING)
     told = list(sections(FILE))
     assert len(told) > 20

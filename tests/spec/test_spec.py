@@ -19,7 +19,7 @@ from tubecert.findings import Finding
 from tubecert.recheck.document import Node
 from tubecert.recheck.specification import read_specification
 from tubecert.recheck.system import system_of
-from tubecert.spec import canonical, codes, load, load_question, load_text
+from tubecert.spec import canonical, codes, load, load_text
 from tubecert.spec.canonical import as_file
 
 OK = sorted((ROOT / "tests/specs/ok").glob("*.yaml"))
@@ -60,14 +60,14 @@ def minimal(old: str, new: str) -> str:
 
 @pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
 def test_good_files_load(path: Path) -> None:
-    spec = load_question(str(path))
+    spec = load(str(path), reads="question")
     assert spec.path == str(path)
     assert all(location.file == str(path) for location in spec.locations.values())
 
 
 @pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
 def test_the_canonical_form_is_a_specification_of_the_same_system(path: Path) -> None:
-    data = canonical(load_question(str(path)))
+    data = canonical(load(str(path), reads="question"))
     said = json.dumps(as_file(data))
     again = load_text(said, "canonical.json", "question")
     assert canonical(again) == data
@@ -486,7 +486,7 @@ def test_numbers_are_bounded_before_anything_is_computed(key: str, number: str) 
 @pytest.mark.parametrize("path", OK + CONFIGS, ids=lambda path: path.stem)
 def test_a_specification_travels(path: Path) -> None:
     """Pickled or copied it is equal, with the very same expressions, and knows where its keys stand."""
-    spec = load_question(str(path))
+    spec = load(str(path), reads="question")
     for other in (pickle.loads(pickle.dumps(spec)), copy.deepcopy(spec), copy.copy(spec)):
         assert other == spec
         assert other.locations == spec.locations

@@ -13,7 +13,7 @@ from tubecert.checking.expectations import UNDECIDED, Claim, Outcome, compared, 
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.findings import Finding, Severity
 from tubecert.kept import nothing_kept
-from tubecert.spec import Setting, Spec, load_question
+from tubecert.spec import Setting, Spec, load
 
 if TYPE_CHECKING:
     from tubecert.progress import Progress
@@ -57,7 +57,7 @@ def _checked(path: str, options: CheckOptions, progress: Progress | None) -> Che
     started = time.perf_counter()
     claims: tuple[Claim, ...] = ()
     try:
-        spec = load_question(path, options.settings)
+        spec = load(path, options.settings, "question")
         findings = _remembered("lint", spec, lambda: _inspected(spec))
         if options.certify and not _errors(findings):
             found = _outcome(spec, options, progress)

@@ -20,7 +20,7 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 """
 
 from tubecert.spec.canonical import canonical
-from tubecert.spec.load import load, load_question, load_text
+from tubecert.spec.load import load, load_text
 from tubecert.spec.machine import Hardware, Hold
 from tubecert.spec.metric import Synthesis
 from tubecert.spec.override import Setting
@@ -33,5 +33,5 @@ from tubecert.spec.values import Interpolation, Knots, Output, Table, Term, Vect
 __all__ = [
     "Afterwards", "Bundle", "Disc", "Disturbance", "Hardware", "Hold", "Interpolation", "Knots", "Obstacle",
     "Output", "PlanKind", "Setting", "Simulation", "Spec", "Synthesis", "Table", "Task", "Term", "Vector",
-    "canonical", "load", "load_question", "load_text",
+    "canonical", "load", "load_text",
 ]  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any, Final, Literal, TypeAlias
 
 from tubecert.errors import SpecError
@@ -77,6 +76,9 @@ NO_SEARCH: Final = (
 )
 
 Reads: TypeAlias = Literal["whole", "question", "plant", "system"]
+"""How much of a file counts. `question`: the whole, also of one that asks about a metric alone (`Spec.lacks` says so).
+`plant`: of one that lacks `uncertainty` or `trajectory` (`Spec.lacks` says what) system, safe set, metric and tube.
+`system`: the first three of these. Where a plan does not count, it rests in the middle of the safe set, and h is 0."""
 
 
 class File:
@@ -137,19 +139,6 @@ def load(path: str, settings: Sequence[Setting] = (), reads: Reads = "whole") ->
     return load_source(read_source(path), settings, reads)
 
 
-load_question: Final = partial(load, reads="question")
-"""The same, also of a file that asks about a metric alone: `Spec.lacks` says so."""
-load_system: Final = partial(load, reads="system")
-"""The same of a file of which only system, safe set and metric matter: it may lack all else, which is not read.
-
-The specification is that of rest in the middle of the safe set without uncertainty."""
-load_plant: Final = partial(load, reads="plant")
-"""The specification in a file that may lack `uncertainty` and `trajectory`: a metric alone can be asked for then.
-
-Of one that lacks either, `Spec.lacks` says what, and system, safe set, metric and tube are read; the rest is as
-`load_system` leaves it."""
-
-
 def load_text(text: str, file: str = "<text>", reads: Reads = "whole") -> Spec:
     """The specification in a text; `file` is what findings call it."""
     return load_source(Source.of(file, text), reads=reads)
@@ -168,7 +157,7 @@ def whole(spec: Spec) -> Spec:
 
 
 def load_source(source: Source, settings: Sequence[Setting] = (), reads: Reads = "whole") -> Spec:
-    """The specification in a source; see `load`, `load_question`, `load_plant` and `load_system`."""
+    """The specification in a source; see `load` and `Reads`."""
     check_limits(source)
     node, findings = compose(source)
     node, misplaced = put(node, settings)
@@ -273,7 +262,7 @@ def _read_named(
     plan = read_trajectory(trajectory, names, plant) if trajectory else None
     start = read_initial_state(entries.get("initial_state"), trajectory, plan, names)
     x0 = start.x0
-    if box is not None and not entries.keys() & {*_LOOP}:  # as `load_system` leaves it
+    if box is not None and not entries.keys() & {*_LOOP}:  # rest, as of a system
         plan, uncertainty = at_rest(entries["safe_set"], box, len(names.inputs))
         x0 = tuple((low + high) / 2 for low, high in box)
     plan = completed(plan, x0) if plan else None

@@ -108,10 +108,9 @@ class Field:
             return None
         known = [*required, *optional]
         fields = {key.text: self.child(key, node) for key, node in pairs if key.text in known}
-        meant: set[str] = set()  # required keys that a reserved or a misspelt one stands for
+        meant: set[str] = set()  # required keys that a misspelt one stands for
         for key, _ in pairs:
             if key.text in reserved:
-                meant.update(required)
                 self._at(codes.NOT_YET, key, f"{self._name(key.text)} is not yet supported", "remove it")
             elif key.text not in fields:
                 meant.update(self._unknown(key, known))
