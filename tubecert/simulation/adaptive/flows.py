@@ -20,6 +20,7 @@ from tubecert.simulation.adaptive.loops import LoopGains
 
 _TURN: Final = 1.0  # rad between two looks at the projection on the first level, half as far on the next
 _MOST_HALVINGS: Final = 12  # of a step
+_WINDOW: Final = 6  # log2 of the half parts that are looked at together, for memory: five turns or more
 _ORDER: Final = 7  # of Taylor's polynomial
 _LAYERED: Final = 0.5  # within a smooth layer of this or less sigma_hat slows down over a part of a turn
 _POLYNOMIALS: Final = (  # p, p', p'' at the start of a step by h at its stages so far
@@ -50,10 +51,13 @@ class Flow(NamedTuple):
     """Flows of (y, p, p', p'') for B (n, m) or (n, m, N), where p is h, with E w after it where a wind blows.
 
     The time is in shares of the step for p. `powers` (.., Z, Z): over half of a part of the step, over a part, over
-    two and so on; the last one is over all of the step.
+    two and so on; the last one is over all of the step. `rows` (.., L (n + 2 m), Z) are xi, sigma_hat and h after
+    every one of L half parts, a window, and `held` (.., L m, Z) sigma_hat alone.
     """
 
     powers: list[Array]
+    rows: Array
+    held: Array
     length: float
     B: Array
 
@@ -78,10 +82,16 @@ class Fast:
         G = np.moveaxis(self._generator(B if B.ndim == 3 else B[..., None], length), -1, 0)
         turns = length * self._speed(B) / _TURN * 2**level
         halvings = 2 + int(np.clip(np.ceil(np.log2(max(turns, 1.0))), 0, _MOST_HALVINGS))
-        powers = [_exponential(G / 2**halvings)]
-        for _ in range(halvings):
+        powers, n, m = [_exponential(G / 2**halvings)], len(self.P), self._m
+        rows = powers[0][:, [*range(n + m), *range(self.at.end, self.at.end + m)]]
+        for halving in range(halvings):
+            if halving < _WINDOW and self.adapts:
+                rows = np.concatenate([rows, rows @ powers[-1]], axis=1)
             powers.append(powers[-1] @ powers[-1])
-        return Flow(powers if B.ndim == 3 else [power[0] for power in powers], length, B)
+        held = rows.reshape(len(G), -1, n + 2 * m, len(G[0]))[:, :, n : n + m].reshape(len(G), -1, len(G[0]))
+        if B.ndim == 3:
+            return Flow(powers, rows, held, length, B)
+        return Flow([power[0] for power in powers], rows[0], held[0], length, B)
 
     def _speed(self, B: Array) -> float:
         """How fast y turns, in rad/s: omega, g and sqrt(Gamma) |S B|."""
@@ -126,33 +136,36 @@ class Fast:
     def advance(self, flow: Flow, z: Array) -> tuple[Array, Array]:
         """y (Y, N) after the whole step, from z = (y, p, p', p'') (Z, N).
 
-        Beside it the largest |S xtilde| and |sigma_hat - h| in the step, (2, N).
+        Beside it the largest |S xtilde| and |sigma_hat - h| in the first window of the step, (2, N).
         """
-        at, m = self.at, self._m
+        y = _applied(flow.powers[-1], z)[: self.at.end]
         if not self.adapts:
-            return _applied(flow.powers[-1], z)[: at.end], np.zeros((2, z.shape[1]))
-        parts = 2 ** (len(flow.powers) - 2)
-        course = np.empty((len(z), parts + 1, z.shape[1]))
-        course[:, 0], course[:, -1] = z, _applied(flow.powers[-1], z)
-        for i, power in enumerate(flow.powers[1:-1]):
-            course[:, 2**i : 2 ** (i + 1)] = _applied(power, course[:, : 2**i])
-        between = _applied(flow.powers[0][..., at.sigma_hat, :], course[:, :-1])
-        size = ((own**2).sum(axis=0).max(axis=0) for own in (course[at.sigma_hat], between))
-        touching = np.flatnonzero(np.maximum(*size) > self.limit**2)
+            return y, np.zeros((2, z.shape[1]))
+        most, size, later = self._most(_applied(flow.rows, z)), np.zeros(z.shape[1]), z
+        for window in range(2 ** max(0, len(flow.powers) - 1 - _WINDOW)):
+            later = _applied(flow.powers[_WINDOW], later) if window else z
+            held = _applied(flow.held, later).reshape(-1, self._m, z.shape[1])
+            size = np.maximum(size, (held**2).sum(axis=1).max(axis=0))
+        touching = np.flatnonzero(size > self.limit**2)
         if len(touching):
-            course[:, 1:, touching] = self._caught(flow, z[:, touching], touching)
-        xi, error = course[at.xi], course[at.sigma_hat] - course[at.end : at.end + m]
-        squares = (xi * _applied(self.P, xi)).sum(axis=0), (error**2).sum(axis=0)
-        most = np.sqrt([np.maximum(square.max(axis=0), 0.0) for square in squares])
-        return course[: at.end, -1], most / [[self.root], [1.0]]
+            y[:, touching], most[:, touching] = self._caught(flow, z[:, touching], touching)
+        return y, most
 
-    def _caught(self, flow: Flow, z: Array, lanes: NDArray[np.intp]) -> Array:
-        """z (Z, parts, ..) of some lanes after every part of the step, with the projection."""
+    def _most(self, seen: Array) -> Array:
+        """The largest |S xtilde| and |sigma_hat - h|, (2, N), of L times xi, sigma_hat and h, (L (n + 2 m), N)."""
+        n, m = len(self.P), self._m
+        seen = seen.reshape(-1, n + 2 * m, seen.shape[-1])
+        xi, error = seen[:, :n], seen[:, n : n + m] - seen[:, n + m :]
+        squares = (xi * (self.P @ xi)).sum(axis=1).max(axis=0), (error**2).sum(axis=1).max(axis=0)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / [[self.root], [1.0]])
+
+    def _caught(self, flow: Flow, z: Array, lanes: NDArray[np.intp]) -> tuple[Array, Array]:
+        """y of some lanes after all parts of the step, with the projection, and what is largest as in `advance`."""
         at, part, B = self.at, flow.powers[1], flow.B
         if B.ndim == 3:
             part, B = part[lanes], B[..., lanes]
         parts = 2 ** (len(flow.powers) - 2)
-        course, dt = np.empty((len(z), parts, z.shape[1])), flow.length / parts
+        seen, dt = list[Array](), flow.length / parts
         missing = np.zeros((len(z), self._m, *B.shape[2:]))  # what a cut was missing from, on the way to it
         missing[at.xi] = dt / 2 * self.root * B
         one = np.eye(self._m).reshape(self._m, self._m, *[1] * (B.ndim - 2))
@@ -160,8 +173,9 @@ class Fast:
         for i in range(parts):
             before, z = z[at.sigma_hat], _applied(part, z)
             z -= times(missing, self._cut(before, z[at.sigma_hat]))
-            course[:, i] = z
-        return course
+            if 2 * i < 2**_WINDOW:
+                seen += [z[: at.u_a.start], z[at.end : at.end + self._m]]
+        return z[: at.end], self._most(np.concatenate(seen))
 
     def _cut(self, before: Array, after: Array) -> Array:
         """What Proj of 2.5 takes out of sigma_hat (m, N) that goes from before to after, along its middle."""
@@ -193,12 +207,8 @@ def times(B: Array, u: Array) -> Array:
 
 
 def _applied(M: Array, z: Array) -> Array:
-    """M z for M (r, Z) or (N, r, Z) and z (Z, .., N)."""
-    if M.ndim == 2:
-        return np.asarray(M @ z.reshape(len(z), -1)).reshape(len(M), *z.shape[1:])
-    columns = z.reshape(len(z), -1, z.shape[-1])
-    found: Array = np.matmul(M, columns.transpose(2, 0, 1)).transpose(1, 2, 0)
-    return found.reshape(M.shape[1], *z.shape[1:])
+    """M z for M (r, Z) or (N, r, Z) and z (Z, N)."""
+    return np.asarray(M @ z if M.ndim == 2 else np.matmul(M, z.T[..., None])[..., 0].T)
 
 
 def _exponential(G: Array) -> Array:
