@@ -13,10 +13,10 @@ from texts import CONFIGS
 from tubecert import pipeline
 from tubecert.certificate.result import Result
 from tubecert.simulation.adaptive.engine import integrate
+from tubecert.simulation.adaptive.lanes import Found
 from tubecert.simulation.adaptive.loops import Batch, Disturbance, Failure, LoopProblem, Runs
 from tubecert.simulation.adaptive.reading import adopted
 from tubecert.simulation.adaptive.setting import Setting, setting_of
-from tubecert.simulation.lanes import Found
 from tubecert.spec import Spec, load, load_text
 
 

@@ -32,7 +32,6 @@ SHARED = [
     "tubecert.report.markdown",
     "tubecert.report.progress",
     "tubecert.report.figures_axes",
-    "tubecert.simulation.lanes",
     "tubecert.simulation.plans",
     "tubecert.simulation.figures",
 ]

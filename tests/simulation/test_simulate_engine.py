@@ -13,9 +13,9 @@ from texts import CONFIGS
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulation.adaptive.engine import _Lanes, integrate
+from tubecert.simulation.adaptive.lanes import follow
 from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.times import output_times
-from tubecert.simulation.lanes import follow
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import constant_plan

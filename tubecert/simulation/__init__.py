@@ -6,8 +6,6 @@ imports this one.
 | module | what it does |
 |---|---|
 | `adaptive`, `sampled` | the loops of the paper in continuous time; the loop that a computer closes |
-| `lanes` | runs as lanes of one vector: Runge-Kutta steps of any system, peaks, what is seen at output times |
-| `halving` | steps are halved until the error estimate of every lane is small enough |
 | `vectors` | a campaign as vectors of runs; what an interruption keeps |
 | `plans` | random plans of a family, as lanes |
 | `obstacles` | how near points come to an obstacle |

@@ -12,9 +12,10 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulation.lanes import SHARES, stepped
 
 Slope: TypeAlias = Callable[[float, Array], Array]
+SHARES: Final = (0.0, 0.5, 0.5, 1.0)  # of a step of the classical Runge-Kutta method, stage by stage
+_WEIGHTS: Final = (1.0, 2.0, 2.0, 1.0)
 _RICCATI: Final = 2000  # steps of the recursion
 _FULL: Final = 0.7  # of all waves are as large as they may be
 _EDGE: Final = (0.5, 0.9)  # of the ellipsoid: from where to where a plan turns back
@@ -26,6 +27,15 @@ def waves(draws: Array, samples: int, k: float) -> Array:
     period, phase, size = np.split(draws, 3)
     sign = np.sign(np.sin(2 * np.pi * (k / (2 * float(samples) ** period) + phase)))
     return np.asarray(np.where(size < _FULL, 1.0, (size - _FULL) / (1 - _FULL)) * sign)
+
+
+def stepped(at: Callable[[int, Array], Array], x: Array, length: float, slope: Array) -> Array:
+    """x after a step of the classical Runge-Kutta method, from the slopes `at` stages; that of the first is given."""
+    total = slope
+    for stage in (1, 2, 3):
+        slope = at(stage, x + SHARES[stage] * length * slope)
+        total = total + _WEIGHTS[stage] * slope
+    return np.asarray(x + length / 6 * total)
 
 
 def integrated(slope: Slope, t: float, x: Array, length: float, count: int) -> Array:

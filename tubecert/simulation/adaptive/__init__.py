@@ -6,7 +6,8 @@ Implements: theory 2 to 4b, the loops.
 | module | what it does |
 |---|---|
 | `loops` | what is simulated, what acts on it, and what comes out |
-| `engine` | batches of runs as lanes of one vector |
+| `engine` | batches of runs as lanes of one vector; their steps are halved until they are near enough |
+| `lanes` | the steps of lanes: peaks, what is seen at output times |
 | `continuous` | the loops as a system of lanes: feedback, and the stages around the fast part |
 | `flows` | (xtilde, sigma_hat, u_a): exact where linear, and caught at the ball of the projection |
 | `acting` | the plant's terms, the disturbance, wind and parameters of every lane |

@@ -26,7 +26,7 @@ from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, times
 from tubecert.simulation.adaptive.geodesics import FOUND, REASONS, Geodesic, Geodesics
 from tubecert.simulation.adaptive.loops import Batch
 from tubecert.simulation.adaptive.times import END, MIDDLE, START, Grid, Reference
-from tubecert.simulation.lanes import SHARES
+from tubecert.simulation.plans import SHARES
 from tubecert.trajectory import Plan
 
 INFEASIBLE: Final = 10
@@ -54,7 +54,10 @@ def reason(stopped: int, limit: float) -> str:
 
 
 class Continuous:
-    """The lanes of some batches on a grid: a `lanes.System`.
+    """The lanes of some batches on a grid, for `lanes.follow`: peaks are taken of their `sizes`.
+
+    `kept` stays, of what is seen, at the output times. `stopped` (N,) is 0 for the lanes that go on; the others may
+    have any values. Above 0 it is why they failed.
 
     `_y` (Y, N) is the fast part of every lane at the start of the step (`flows.blocks`); in `_known` behind it stands h
     at every stage, with E w after it where one blows, (F, N), and in `_B` B (n, m, N) or (n, m).
@@ -66,7 +69,7 @@ class Continuous:
         first = batches[0].problem
         n, m = len(first.model.states), len(first.model.inputs)
         problems = [batch.problem for batch in batches for _ in batch.x0]
-        self.steps, self._grid, self._N = grid.steps, grid, len(problems)
+        self.grid, self._N = grid, len(problems)
         self._decay = 2 * float(first.model.rate)
         self._P = np.eye(n) if first.P is None else first.P
         self._x0 = np.concatenate([batch.x0 for batch in batches]).T
@@ -98,7 +101,7 @@ class Continuous:
 
     def at(self, step: int, stage: int, x: Array) -> Array:
         """f + B(u* + k + h) + E w (n, N); what u_a has added to x meanwhile is added here."""
-        t = float(self.steps.start[step] + SHARES[stage] * self.steps.length[step])
+        t = float(self.grid.start[step] + SHARES[stage] * self.grid.length[step])
         plan = self._plan(step, _SIDES[stage])
         if stage == 0:
             self._B.clear()
@@ -128,7 +131,7 @@ class Continuous:
 
     def _plan(self, step: int, side: int) -> Reference:
         """The plans of all lanes, (.., 1) if that is one."""
-        found = (part[step, side] for part in self._grid.plan)
+        found = (part[step, side] for part in self.grid.plan)
         return Reference(*(found if self._plans is None else (part[:, self._plans] for part in found)))
 
     def _near(self, x: Array, plan: Array) -> Array:
@@ -164,8 +167,8 @@ class Continuous:
 
     def _prepare(self, step: int, x: Array) -> None:
         """The flows of a step: those of B at its middle, where x comes but for u_a."""
-        length, level = float(self.steps.length[step]), self._grid.level
-        t, B = float(self.steps.start[step]) + length / 2, self._B[0]
+        length, level = float(self.grid.length[step]), self.grid.level
+        t, B = float(self.grid.start[step]) + length / 2, self._B[0]
         if B.ndim == 3:
             B = self._acting.input(t, x + length / 2 * times(B, self._y[self._at.u_a]))
             self._own = [group.fast.flow(B[..., group.lanes], length, level) for group in self._groups]
@@ -190,7 +193,7 @@ class Continuous:
             self._y[:, self.stopped != FOUND] = 0.0
         return moved
 
-    def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
+    def instant(self, slope: Array) -> dict[str, Array]:
         """What is seen of the lanes at the start of a step; `off` is x - x*, `within` what the step before had seen."""
         at, y = self._at, self._y
         u_a = y[at.u_a].copy()
@@ -205,9 +208,10 @@ class Continuous:
         }
 
     def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
-        """What peaks are taken of: d(x*, x), |S (x - x*)|, |u|, |k|, |S xtilde|, |sigma_hat - h|, |S x'|.
+        """What peaks are taken of, (S, N), from what was seen at S instants, (S, .., N).
 
-        xtilde and sigma_hat may turn often in a step: theirs are the largest since the step before.
+        d(x*, x), |S (x - x*)|, |u|, |k|, |S xtilde|, |sigma_hat - h|, |S x'|. xtilde and sigma_hat may turn often in a
+        step: theirs are the largest since the step before.
         """
         length, error = self._length, np.where(self._predicts, _norm(rows["sigma_hat"] - rows["h"]), 0.0)
         xtilde, within = length(rows["xtilde"]), np.moveaxis(rows["within"], 1, 0)

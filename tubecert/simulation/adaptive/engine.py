@@ -1,36 +1,58 @@
-"""Batches of runs as lanes of one vector, integrated to an error that is asked for."""
+"""Batches of runs as lanes of one vector: steps are halved until the error of every lane is as small as is asked.
+
+Two whole runs are compared. Only these tell the error: between two switches of a feedback a loop may amplify what was
+lost in one step.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.continuous import Continuous, reason
+from tubecert.simulation.adaptive.lanes import Found, combined, follow, of_some
 from tubecert.simulation.adaptive.loops import Batch, Failure, Runs
 from tubecert.simulation.adaptive.times import START, steps
-from tubecert.simulation.halving import Places, proposed, resolved
-from tubecert.simulation.lanes import Found, of_some
 
+Places = NDArray[np.intp]
+_LEVELS: Final = 7  # of steps: the last ones are 2^6 times shorter than the first
+_AGREEING: Final = 0.02  # of the horizon: two levels that stop a lane this near to each other are believed
+_LIVED: Final = 16  # steps that a lane must have come: what stops it earlier may be nothing but their length
+_PATIENCE: Final = 2  # levels over which the change of a run must fall to less than half (theory: to 1/256)
+_DOUBTFUL: Final = 5  # the level from which on a run that does not converge is given up
+_ENOUGH: Final = 5.0  # tolerances that an error may be told to be: it is mostly far below
+_LUCK: Final = 2.0  # times a change an error may be, where a feedback has kinks ...
+_BEFORE: Final = 1 / 8  # ... and times the change before
 _ESTIMATE: Final = 0.02  # of R_H, 1 % of what bounds |sigma_hat - h|: what sigma_hat and that peak may change
+
+
+class _Resolved(NamedTuple):
+    """What N lanes found in their last steps; as in `Runs`."""
+
+    found: Found
+    error: Array
+    unresolved: Array
+    steps: NDArray[np.int64]
 
 
 def integrate(batches: Sequence[Batch], *, tolerance: float, count: int | None = None) -> tuple[Runs, ...]:
     """The runs of every batch, all as lanes of one vector, to an error of about `tolerance` in |S x|, P = S'S.
 
     Batches are of the same model and times. A lane that diverges or has no geodesic is stopped and listed in
-    `failures`, and the others go on. With a `count` of steps runs are proposals whose error is not known
-    (`halving.proposed`), seen at their ends alone.
+    `failures`, and the others go on. With a `count` of steps runs are proposals whose error is not known (inf),
+    seen at their ends alone.
     """
     lanes = _Lanes(batches, count)
-    best = resolved(lanes, tolerance) if count is None else proposed(lanes)
+    best = _resolved(lanes, tolerance) if count is None else _proposed(lanes)
     runs = list[Runs]()
     for batch, a, b in lanes.parts():
         problem, found = batch.problem, of_some(best.found, slice(a, b))
         plan = next(i for i, each in enumerate(lanes.plans) if each is problem.plan)
-        at = lanes.grid.steps.outputs, START, slice(None), plan
+        at = lanes.grid.outputs, START, slice(None), plan
         runs.append(
             Runs(
                 t=lanes.times,
@@ -50,7 +72,7 @@ def integrate(batches: Sequence[Batch], *, tolerance: float, count: int | None =
 
 
 class _Lanes:
-    """The lanes of all batches: a `halving.Vector`. `grid` is that of the first level."""
+    """The lanes of all batches, which can be run in the steps of any level; `grid` is that of the first."""
 
     def __init__(self, batches: Sequence[Batch], count: int | None) -> None:
         first = batches[0].problem
@@ -74,10 +96,70 @@ class _Lanes:
         return Continuous([batch for batch in own if len(batch.x0)], grid, self.plans)
 
     def apart(self, lanes: Places, finer: Found, coarser: Found) -> tuple[Array, Array]:
-        """|S x| of differences, and those of sigma_hat and its peak, of the room that they have."""
+        """|S x| of differences (K, N), and those of sigma_hat and its peak, of the room that they have, (N,)."""
         z = finer.seen["x"] - coarser.seen["x"]
         square = (z * (z if self._P is None else self._P @ z)).sum(axis=1)
         moved = np.sqrt(((finer.seen["sigma_hat"] - coarser.seen["sigma_hat"]) ** 2).sum(axis=1)).max(axis=0)
         with np.errstate(invalid="ignore"):  # lanes that were stopped at once have no peak
             peaks = np.abs(finer.peak["sigma_error"] - coarser.peak["sigma_error"])
         return np.sqrt(np.maximum(square, 0.0)), np.maximum(moved, peaks) / self._room[lanes]
+
+
+def _proposed(vector: _Lanes) -> _Resolved:
+    """All lanes in the longest steps; their error is not known: inf."""
+    system = vector.system(np.arange(vector.N), 0)
+    error, never = np.full(vector.N, np.inf), np.full(vector.N, np.nan)
+    return _Resolved(follow(system), error, never, np.full(vector.N, len(system.grid.start) - 1))
+
+
+def _resolved(vector: _Lanes, tolerance: float) -> _Resolved:
+    """All lanes, level after level of those that are not done.
+
+    What is told of a lane's error is at most five tolerances, or it cannot be integrated so far. It is given up as soon
+    as halving its steps no longer helps, which is so where the loop itself amplifies every difference.
+    """
+    best, lanes = _proposed(vector), np.arange(vector.N)
+    changes = np.full((_LEVELS, vector.N), np.inf)
+    failed = np.zeros((_LEVELS, vector.N), dtype=bool)
+    failed[0] = best.found.stopped > 0
+    for level in range(1, _LEVELS):
+        system, whole = vector.system(lanes, level), len(lanes) == vector.N
+        coarser, finer = best.found if whole else of_some(best.found, lanes), follow(system)
+        best = best._replace(found=finer if whole else combined([best.found, finer], _put(lanes)))
+        best.steps[lanes] = len(system.grid.start) - 1
+        apart, beside = vector.apart(lanes, finer, coarser)
+        change = np.nan_to_num(apart.max(axis=0), nan=np.inf)
+        failed[level, lanes], changes[level, lanes] = finer.stopped > 0, change
+        told = np.maximum(_LUCK * change, changes[level - 1, lanes] * _BEFORE if level > 1 else 0.0)
+        best.error[lanes] = np.where(failed[level, lanes], np.inf, told)
+        beyond = ~(apart <= tolerance)
+        first = vector.times[np.argmax(beyond, axis=0)]
+        best.unresolved[lanes] = np.where(beyond.any(axis=0), first, np.nan)
+        agree = np.abs(finer.ended - coarser.ended) <= _AGREEING * vector.times[-1]
+        agree &= failed[level - 1, lanes] & (np.searchsorted(system.grid.start, finer.ended) >= _LIVED)
+        near = (told <= _ENOUGH * tolerance) & (beside <= 1)
+        done = np.where(failed[level, lanes], agree, near)
+        if level >= _DOUBTFUL:
+            done |= _hopeless(changes[: level + 1, lanes], failed[: level + 1, lanes])
+        lanes = lanes[~done]
+        if not len(lanes):
+            break
+    return best
+
+
+def _put(lanes: Places) -> Callable[[Array, Array], Array]:
+    """What replaces some lanes of an array by those of another."""
+
+    def put(whole: Array, part: Array) -> Array:
+        whole = whole.copy()
+        whole[..., lanes] = part
+        return whole
+
+    return put
+
+
+def _hopeless(changes: Array, failed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether smaller steps do not help: a change that stays, or a lane that is stopped at every level."""
+    now, then = changes[-1], changes[-1 - _PATIENCE]
+    stays = np.isfinite(now) & np.isfinite(then) & (now > 0.5 * then)
+    return np.asarray(stays | failed[-1 - _PATIENCE :].all(axis=0))

@@ -20,7 +20,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression
 from tubecert.expression.matrix import Matrix
 from tubecert.model import ControlAffineModel
-from tubecert.simulation.lanes import Found, combined
+from tubecert.simulation.adaptive.lanes import Found, combined
 from tubecert.trajectory import Plan
 
 Controller = Literal["nominal", "ccm", "reference", "l1"]
@@ -153,8 +153,10 @@ class Runs:
     `t` (K,), `x_plan` (K, n), `u_plan` (K, m). What was seen is an attribute, too, with the lanes first: x, x - x* =
     `off`, x' = `slope` and `xtilde` (N, K, n), `k`, `u_a`, `sigma_hat`, `h` and u = u* + k + u_a (N, K, m), `distance`
     (N, K), the Riemannian d(x*, x). A quantity that a loop does not have is 0. Peaks over all steps are in `found`, as
-    are the ends of inputs. After a lane was stopped its values are nan. `error`, `unresolved` and `steps` (N,):
-    `halving.Resolved`.
+    are the ends of inputs. After a lane was stopped its values are nan. `error` (N,) is twice the largest difference of
+    states to the run with steps twice as long, or an eighth of the difference before: mostly far above the true one;
+    inf for a lane that failed. `unresolved` (N,) is the first output time at which that difference exceeds the
+    tolerance, nan where it never does; `steps` (N,) how many the last ones were.
     """
 
     t: Array

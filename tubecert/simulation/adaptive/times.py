@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.model import TIME
 from tubecert.simulation.adaptive.loops import LoopProblem
-from tubecert.simulation.lanes import Steps
 from tubecert.spec import Knots
 from tubecert.trajectory import Plan
 
@@ -30,14 +30,16 @@ class Reference(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Steps of a level.
+    """Steps of a level: when they begin, (S + 1,) in s, and their lengths, the last 0; `outputs` (K,) are output times.
 
     `plan`: x* (S + 1, 3, n, L), f(x*) + B(x*)u* (S + 1, 3, n, L) and u* (S + 1, 3, m, L) of L plans at start, middle
     and end of every step; where u* jumps, the side that belongs to the step.
     """
 
     level: int
-    steps: Steps
+    start: Array
+    length: Array
+    outputs: NDArray[np.int64]
     plan: Reference
 
 
@@ -90,7 +92,9 @@ def steps(problem: LoopProblem, level: int, plans: Sequence[Plan], count: int | 
     courses = [_course(problem, plan, start, length) for plan in plans]
     return Grid(
         level=level,
-        steps=Steps(np.append(start, problem.horizon), np.append(length, 0.0), seen),
+        start=np.append(start, problem.horizon),
+        length=np.append(length, 0.0),
+        outputs=seen,
         plan=Reference(*(np.stack(part, axis=-1) for part in zip(*courses, strict=True))),
     )
 

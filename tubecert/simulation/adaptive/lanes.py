@@ -1,62 +1,24 @@
-"""Runs as lanes of one vector, from start to end: Runge-Kutta steps of any system, and what is seen of every lane.
+"""Runs as lanes of one vector, from start to end: the steps of the loops, and what is seen of every lane.
 
-Arrays have the lanes last. The stages are those of the classical method (`System`).
+Arrays have the lanes last.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
+from tubecert.simulation.plans import stepped
+
+if TYPE_CHECKING:
+    from tubecert.simulation.adaptive.continuous import Continuous
 
 _CHUNK: Final = 64  # steps whose peaks are taken at once
-_WEIGHTS: Final = (1.0, 2.0, 2.0, 1.0)
-SHARES: Final = (0.0, 0.5, 0.5, 1.0)  # of a step, stage by stage
-
-
-class Steps(NamedTuple):
-    """When steps begin, (S + 1,) in s, and their lengths, the last 0; `outputs` (K,) begin at the output times."""
-
-    start: Array
-    length: Array
-    outputs: NDArray[np.int64]
-
-
-class System(Protocol):
-    """What N lanes do in some `steps`: all that the loops in continuous time and the sampled ones have to say.
-
-    A step calls `at` four times, for the slopes at its stages, and after the first of them `instant`; then `step`, for
-    what goes on beside the slopes, such as an exact flow. Peaks are taken of the `sizes` of what `instant` saw, and of
-    that what is `kept` stays at the output times. `stopped` (N,) is 0 for the lanes that go on; the others may have any
-    values. Above 0 it is why they failed.
-    """
-
-    steps: Steps
-    stopped: NDArray[np.int64]
-
-    @property
-    def kept(self) -> tuple[str, ...]:
-        """Names of what stays behind of what is seen."""
-
-    def start(self) -> Array:
-        """x (n, N) at the start."""
-
-    def at(self, step: int, stage: int, x: Array) -> Array:
-        """The slope (n, N) at a stage, to which the slope of the stage before leads from the start of the step."""
-
-    def instant(self, step: int, x: Array, slope: Array) -> dict[str, Array]:
-        """What is seen of the lanes at the start of a step, by name, (.., N); `u` (m, N) are the inputs."""
-
-    def step(self, step: int) -> Array | float:
-        """Goes to the end of a step; what that adds to x."""
-
-    def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
-        """What peaks are taken of, (S, N), from what was seen at S instants, (S, .., N)."""
 
 
 class Found(NamedTuple):
@@ -92,14 +54,18 @@ def of_some(found: Found, lanes: NDArray[np.intp] | slice) -> Found:
     return combined([found], lambda part: part[..., lanes])
 
 
-def follow(system: System) -> Found:
-    """All steps of a system, from its start on."""
-    x, length = system.start(), system.steps.length.tolist()
+def follow(system: Continuous) -> Found:
+    """All steps of some lanes, from their start on.
+
+    A step takes the slopes `at` its four stages, and after the first of them what is seen at that `instant`; then what
+    goes on beside the slopes, the exact flows, in `step`.
+    """
+    x, length = system.start(), system.grid.length.tolist()
     record = _Record(system)
     with np.errstate(all="ignore"):
         for step in range(len(length)):
             slope = system.at(step, 0, x)
-            record.see(step, x, slope)
+            record.see(slope)
             if step < len(length) - 1:
                 x = stepped(partial(system.at, step), x, length[step], slope) + system.step(step)
             if record.all_stopped(step):
@@ -107,27 +73,18 @@ def follow(system: System) -> Found:
         return record.closed()
 
 
-def stepped(at: Callable[[int, Array], Array], x: Array, length: float, slope: Array) -> Array:
-    """x after a step of the classical Runge-Kutta method, from the slopes `at` stages; that of the first is given."""
-    total = slope
-    for stage in (1, 2, 3):
-        slope = at(stage, x + SHARES[stage] * length * slope)
-        total = total + _WEIGHTS[stage] * slope
-    return np.asarray(x + length / 6 * total)
-
-
 class _Record:
     """What is left behind so far, and the rows of the steps since peaks were last taken."""
 
-    def __init__(self, system: System) -> None:
-        self._system, self._start, self._outputs = system, system.steps.start, system.steps.outputs
+    def __init__(self, system: Continuous) -> None:
+        self._system, self._start, self._outputs = system, system.grid.start, system.grid.outputs
         self._rows, self._alive, self._first = list[dict[str, Array]](), list[NDArray[np.bool_]](), 0
         self._found: Found | None = None
         self._ended = np.full(len(system.stopped), np.nan)
 
-    def see(self, step: int, x: Array, slope: Array) -> None:
+    def see(self, slope: Array) -> None:
         """Keeps what is seen of the lanes that have come to a step."""
-        self._rows.append(self._system.instant(step, x, slope))
+        self._rows.append(self._system.instant(slope))
         self._alive.append(self._system.stopped == 0)
         if len(self._rows) == _CHUNK:
             self._take()
