@@ -1,7 +1,7 @@
 """The command line: argv in, exit code out; no mathematics.
 
 In: arguments. Out: a report on stdout, findings and progress on stderr, a certificate file, an exit code.
-Until a command runs, nothing but typer and the error family is imported: `--help` is to feel instant.
+Until a command is called, nothing but typer and the error family is imported: `--help` is to feel instant.
 
 | module | what it does |
 |---|---|

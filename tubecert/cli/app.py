@@ -1,4 +1,4 @@
-"""The commands and their options. What a command does is imported when it runs."""
+"""The commands and their options."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import warnings
 from typing import Any
 
 import typer
+import typer.core
 
 from tubecert.cli.adapter import OUTPUT, Output, command_of, said, with_options
 from tubecert.cli.guard import flush_stdout, refuse_usage, stdout_failed
@@ -14,7 +15,22 @@ from tubecert.errors import ExitCode
 
 # ClickException: typer has a click of its own, or uses click's
 _USAGE: type[Exception] = typer.BadParameter.__mro__[2]
+
+
+class Commands(typer.core.TyperGroup):
+    """The commands. A module of one is imported when that is called, with all that stands at its top."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that is called, and what it is called with."""
+        if args and args[0] in self.commands:
+            alone = typer.Typer(rich_markup_mode=None, add_completion=False)
+            command_of(args[0]).add(alone, args[0])
+            self.commands[args[0]] = typer.main.get_command(alone)
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
+    cls=Commands,
     name="tubecert",
     help=said().tubecert["about"],
     epilog=said().tubecert["after"],
@@ -32,8 +48,8 @@ def _main(context: typer.Context, **given: Any) -> None:
 
 
 app.callback(invoke_without_command=True)(with_options(_main, OUTPUT, version=True))
-for _name in said().commands:
-    command_of(_name).add(app, _name)
+for _name, _own in said().commands.items():  # what help shows
+    app.command(_name, short_help=_own["short"])(lambda: None)
 
 
 def start() -> int:

@@ -8,18 +8,27 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from tubecert import certificate
 from tubecert.asking import SETTINGS, SPEC, Text, words_of
-from tubecert.cli import keeper
+from tubecert.cli import keeper, telling
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.export import folder_of
+from tubecert.cli.report import check_pages
+from tubecert.cli.telling import plan_of, refused, spare
+from tubecert.digits import exact
 from tubecert.errors import ExitCode, TubecertError
+from tubecert.files import read
 from tubecert.library import certifying
+from tubecert.library.pages import Report
+from tubecert.library.specification import Specification
+from tubecert.spec import Setting, Spec, load
+from tubecert.spec.source import METRIC
+from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
     from tubecert.pipeline.synthesised import Synthesised
-    from tubecert.spec import Setting, Spec
 
 _OF_SEARCH: Final = 0.5  # of the time that is given: the certification has the rest
 _WORDS: Final = {
@@ -47,15 +56,8 @@ def certify(
     **asked: Any,
 ) -> ExitCode:
     """Prove the tube around the plan and find the smallest gains; always write the certificate."""
-    from tubecert import certificate
-    from tubecert.cli import telling
-    from tubecert.cli.report import check_pages
-    from tubecert.cli.telling import spare
-    from tubecert.library.pages import Report
-    from tubecert.library.specification import Specification
     from tubecert.library.stated import page_of
     from tubecert.lint.plan import held
-    from tubecert.spec import load
 
     metric = asked.get("metric")
     certificate.check_target(output)
@@ -100,10 +102,6 @@ def _will(found: Synthesised, target: str | None) -> keeper.Will | None:
     """The metric that was found, if the certification does not come to its end."""
     if target is None or found.file is None:
         return None
-    from tubecert import certificate
-    from tubecert.cli import telling
-    from tubecert.digits import exact
-
     telling.found(f"metric proven, rate {exact(found.file.rate)} 1/s: kept in {target}")
     text = certificate.dump(found.file.to_json())
     return {"files": {target: text}, "said": "", "code": ExitCode.UNDECIDED.value}
@@ -114,9 +112,6 @@ def _kept_place(file: str, system: Spec, beside: str, *, synthesised: bool) -> s
 
     Raises `TargetError` if it cannot go there, or would take the place of an input or of what somebody wrote by hand.
     """
-    from tubecert import certificate
-    from tubecert.cli.telling import plan_of, refused, spare
-
     plan = plan_of(file, system)
     spare(beside, {"plan": plan})
     if beside == certificate.STDOUT or not synthesised or system.metric or system.synthesis is None:
@@ -133,9 +128,6 @@ def _kept_place(file: str, system: Spec, beside: str, *, synthesised: bool) -> s
 
 def _by_tubecert(path: str) -> bool:
     """Whether a file is a metric that tubecert wrote: it can write it again."""
-    from tubecert.files import read
-    from tubecert.spec.source import METRIC
-
     try:
         content = json.loads(read(path, METRIC))
     except (TubecertError, ValueError, RecursionError):
@@ -147,10 +139,8 @@ def _kept_metric(found: Certification | SampledCertification, target: str | None
     """The file in which a synthesised metric was kept, None if there is none."""
     if target is None:
         return None
-    from tubecert import certificate
     from tubecert.certificate.result import metric_file
     from tubecert.library.certification import Certification
-    from tubecert.verdict import Verdict
 
     assert isinstance(found, Certification)
     metric, synthesis = found.metric, found.result.synthesis

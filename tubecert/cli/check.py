@@ -6,20 +6,32 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tubecert.asking import ENDING, SETTINGS, Choice, Exact, Flag, Text, refuse
-from tubecert.cli import keeper
+from tubecert.cli import keeper, telling
 from tubecert.cli.adapter import Output, command
+from tubecert.cli.guard import write_stdout
 from tubecert.errors import ExitCode, SpecError, TubecertError
+from tubecert.executor import Serial, chosen
+from tubecert.files import read as read_file
+from tubecert.findings import Finding, Severity
 from tubecert.library.certifying import SCHEDULER
+from tubecert.library.reading import read
+from tubecert.library.workers import cluster_at
+from tubecert.printable import printable_json, visible
+from tubecert.progress import Phase
+from tubecert.report import findings
+from tubecert.report.progress import Pieces
+from tubecert.report.terminal import Terminal
+from tubecert.spec import Setting, Spec, load, load_text
+from tubecert.spec.source import SPECIFICATION
 
 if TYPE_CHECKING:
     from tubecert.checking import Checked, CheckOptions
-    from tubecert.report.terminal import Terminal
-    from tubecert.spec import Setting, Spec
 
 _SUFFIXES = {".yaml", ".yml"}
 _OF_SPECIFICATIONS = rb"""(?m)^\s*\{?\s*["']?(tubecert|safe_set)["']?\s*:"""
@@ -70,9 +82,7 @@ def check(
     if family is not None and settings:
         refuse("--set", "", "--set is not for plans of a family", "leave --family or --set out")
     from tubecert.checking import CheckOptions
-    from tubecert.cli.guard import write_stdout
     from tubecert.report import github
-    from tubecert.report.terminal import Terminal
 
     if family is not None:
         results = _members(specs, family)
@@ -88,10 +98,10 @@ def check(
         options = options if budget is None else replace(options, budget=budget)
         results = _checked(files, options, how, scheduler, jobs) if files else []
         results = [*results, *_skipped(others)] or _nothing(specs)
-    chosen = format_ or ("json" if how.json else "github" if github.detected() else "text")
-    write_stdout(written(chosen, results, Terminal.stdout(color=how.color), quiet=how.quiet))
+    form = format_ or ("json" if how.json else "github" if github.detected() else "text")
+    write_stdout(written(form, results, Terminal.stdout(color=how.color), quiet=how.quiet))
     keeper.tell({"said": True})
-    if chosen == "github":
+    if form == "github":
         github.append_step_summary(results)
     return max((result.code for result in results), key=_WORST.index)
 
@@ -114,19 +124,14 @@ def _below(path: str) -> list[str]:
 
 def _is_specification(file: str) -> bool:
     """Whether a YAML file has a key that every specification has; what cannot be read is left to the check to tell."""
-    from tubecert.files import read
-    from tubecert.spec.source import SPECIFICATION
-
     try:
-        return re.search(_OF_SPECIFICATIONS, read(file, SPECIFICATION)) is not None
+        return re.search(_OF_SPECIFICATIONS, read_file(file, SPECIFICATION)) is not None
     except TubecertError:
         return True
 
 
 def _skipped(others: Sequence[str]) -> list[Checked]:
     """What was left alone is said, once."""
-    from tubecert.findings import Severity
-
     if not others:
         return []
     what = "1 file is no specification" if len(others) == 1 else f"{len(others)} files are no specifications"
@@ -146,7 +151,6 @@ def _said(
     path: str, code: str, message: str, help: str, end: ExitCode = ExitCode.CERTIFIED, **more: Any
 ) -> list[Checked]:
     from tubecert.checking import Checked
-    from tubecert.findings import Finding
 
     finding = Finding(code=code, message=message, help=help, **more)
     return [Checked(path=path, findings=(finding,), code=end)]
@@ -156,14 +160,7 @@ def _checked(
     files: Sequence[str], options: CheckOptions, how: Output, scheduler: str | None, jobs: int
 ) -> list[Checked]:
     """The results in the order of the files, whichever is ready first."""
-    from functools import partial
-
     from tubecert.checking import check
-    from tubecert.cli import telling
-    from tubecert.executor import Serial, chosen
-    from tubecert.library.workers import cluster_at
-    from tubecert.progress import Phase
-    from tubecert.report.progress import Pieces
 
     if scheduler is not None:  # there files are known by their places, not by where the command runs
         files = [str(Path(file).resolve()) for file in files]
@@ -182,9 +179,6 @@ def _checked(
 
 def written(form: str, results: Sequence[Checked], terminal: Terminal, *, quiet: bool = False) -> str:
     """Results as one of the `FORMATS`."""
-    from tubecert.printable import printable_json
-    from tubecert.report import findings
-
     found = [item for result in results for item in result.findings]
     if form == "text":
         closing = findings.summary(found, len(results))
@@ -199,11 +193,6 @@ def written(form: str, results: Sequence[Checked], terminal: Terminal, *, quiet:
 
 def _members(paths: Sequence[str], family: str) -> list[Checked]:
     """What there is to say of each plan: a CSV file, or a specification whose trajectory it is."""
-    from tubecert.findings import Finding
-    from tubecert.library.reading import read
-    from tubecert.printable import visible
-    from tubecert.spec import load, load_text
-
     certified = Path(family).suffix.lower() == ".json"
     spec = load_text(read(family).effective.text, family) if certified else load(family)
     if spec.trajectory.bundle is None:
@@ -215,17 +204,15 @@ def _members(paths: Sequence[str], family: str) -> list[Checked]:
 
 def _member(path: str, family: Spec) -> Checked:
     from tubecert.checking import Checked
-    from tubecert.findings import Severity
     from tubecert.pipeline.membership import NO_MEMBER, UNDECIDED, member_spec, membership
-    from tubecert.printable import visible
 
     try:
-        findings = membership(member_spec(path, family), family, visible(path))
+        found = membership(member_spec(path, family), family, visible(path))
     except TubecertError as error:
         return Checked(path=path, findings=error.findings, code=error.exit_code)
-    codes = {item.code for item in findings if item.severity is Severity.ERROR}
+    codes = {item.code for item in found if item.severity is Severity.ERROR}
     code = ExitCode.CERTIFIED
     if codes:
         code = ExitCode.NOT_CERTIFIED if NO_MEMBER in codes else ExitCode.UNDECIDED
     assert codes <= {NO_MEMBER, UNDECIDED}
-    return Checked(path=path, findings=tuple(findings), code=code)
+    return Checked(path=path, findings=tuple(found), code=code)

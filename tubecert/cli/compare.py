@@ -6,8 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from tubecert import certificate
 from tubecert.asking import CERTIFICATE, Choice, Text, refuse
 from tubecert.cli.adapter import Output, command
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.telling import present, refused, spare
+from tubecert.files import STDIN
 
 _FILES = "A page or a table: FILE.html (with figures), FILE.md, FILE.csv or FILE.json; may be repeated."
 _WORDS: Final = {
@@ -26,10 +30,6 @@ def compare(
     """Put gains, tubes and margins of certificates side by side, and name what differs in their specifications."""
     if how.json and format_ not in ("text", "json"):
         refuse("--format", "", "--json and --format exclude each other")
-    from tubecert import certificate
-    from tubecert.cli.guard import write_stdout
-    from tubecert.cli.telling import present, refused, spare
-    from tubecert.files import STDIN
     from tubecert.library import comparing
     from tubecert.report.comparison import page_of
 

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 from tubecert.asking import CERTIFICATE, Text
 from tubecert.cli.adapter import Output, command
+from tubecert.cli.guard import write_stdout
+from tubecert.printable import visible
 
 _WORDS = {
     "certificate": replace(CERTIFICATE, help="A certificate (JSON) of a sampled loop."),
@@ -16,9 +18,7 @@ _WORDS = {
 @command(_WORDS)
 def export(how: Output, certificate: str, *, output: str | None = None) -> None:
     """Write the controller that a certificate of a sampled loop is about: C99, with its data and a self-test."""
-    from tubecert.cli.guard import write_stdout
     from tubecert.library import exporting
-    from tubecert.printable import visible
 
     found = exporting.export(certificate, output or folder_of(certificate))
     if not how.quiet:

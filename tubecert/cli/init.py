@@ -7,8 +7,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
+from tubecert import certificate
 from tubecert.asking import Choice, Flag, Text, refuse
 from tubecert.cli.adapter import Output, command
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.telling import refused
 from tubecert.errors import TargetError
 from tubecert.printable import visible
 
@@ -34,10 +37,6 @@ def init(
     quiet: bool = False,
 ) -> None:
     """Write a commented specification to start from; it certifies as it is. Nothing is overwritten."""
-    from tubecert import certificate
-    from tubecert.cli.guard import write_stdout
-    from tubecert.cli.telling import refused
-
     if file is not None and output is not None:
         refuse("--output", "", f"FILE and --output name the same: give {file} or {output}")
     if file in TEMPLATES:
@@ -77,6 +76,4 @@ def _create(name: str, text: str) -> None:
 
 
 def _refused(message: str) -> TargetError:
-    from tubecert.cli.telling import refused
-
     return refused(message, "choose another file: tubecert init FILE")

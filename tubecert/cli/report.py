@@ -9,7 +9,12 @@ from typing import Any, Final
 
 from tubecert.asking import CERTIFICATE, Text, words_of
 from tubecert.cli.adapter import Output, command
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.telling import refused
+from tubecert.files import STDIN
 from tubecert.library import pages
+from tubecert.library.reading import read
+from tubecert.printable import printable_json, visible
 
 _FILES: Final = "The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]"
 _WORDS: Final = {
@@ -25,11 +30,6 @@ def report(
     how: Output, certificate: str, *, output: Sequence[str] = (), figures: str | None = None, **asked: Any
 ) -> None:
     """Make a page from a certificate, without certifying anything again."""
-    from tubecert.cli.guard import write_stdout
-    from tubecert.cli.telling import refused
-    from tubecert.files import STDIN
-    from tubecert.library.reading import read
-    from tubecert.printable import printable_json, visible
     from tubecert.report.claimed import NOT_RECHECKED
 
     if certificate == STDIN and not output:
@@ -54,7 +54,6 @@ def check_pages(targets: Sequence[str], taken: Mapping[str, str | None]) -> None
     `taken` says which files must stay what they are.
     """
     from tubecert import certificate
-    from tubecert.cli.telling import refused
 
     kept = {what: path for what, path in taken.items() if path is not None}
     for page in targets:

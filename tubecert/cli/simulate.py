@@ -9,15 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tubecert.asking import ENDING, METRIC, SETTINGS, SPEC, Exact, Text, flag, refuse, words_of
+from tubecert.cli import telling
 from tubecert.cli.adapter import Output, command
 from tubecert.errors import ExitCode
 from tubecert.library import certifying, simulating
+from tubecert.library.reading import read
+from tubecert.library.specification import Specification
+from tubecert.printable import visible
+from tubecert.progress import Phase, Progress, Step
+from tubecert.spec import Setting, Spec, load
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
-    from tubecert.progress import Progress
-    from tubecert.spec import Setting, Spec
 
 _WITHOUT: Final = " (without --certificate)."
 _APART: Final = (
@@ -59,11 +63,7 @@ def simulate(
     for one, other, message in _APART:
         if given.get(one) is not None and given.get(other) is not None:
             refuse(_WORDS[other].called or flag(other), "", message)
-    from tubecert.cli import telling
-    from tubecert.library.specification import Specification
-    from tubecert.progress import Phase, Step
     from tubecert.simulation.folder import prepared
-    from tubecert.spec import load
 
     system = load(spec, settings)
     simulating.require_ready(system)
@@ -84,7 +84,6 @@ def _read(path: str, system: Spec) -> Certification | SampledCertification:
     """The certificate; raises `TargetError` for one of another kind of loop than that of the specification."""
     from tubecert.certificate.file import foreign
     from tubecert.library.certification import Certification
-    from tubecert.library.reading import read
 
     found = read(path)
     if isinstance(found, Certification) and system.hardware is not None:
@@ -96,9 +95,6 @@ def _certified(
     file: str, system: Spec, folder: str, progress: Progress, **given: Any
 ) -> Certification | SampledCertification:
     """A new certificate, which is kept in the folder."""
-    from tubecert.library.specification import Specification
-    from tubecert.printable import visible
-
     there = f"{Path(file).stem}.certificate.json"
     hint = f" (--certificate {visible(there)} takes the one that is there)" if Path(there).is_file() else ""
     if sys.stderr is not None:

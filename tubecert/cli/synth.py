@@ -8,16 +8,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from tubecert import certificate
 from tubecert.asking import SETTINGS, SPEC, Text, words_of
-from tubecert.cli import keeper
+from tubecert.cli import keeper, telling
 from tubecert.cli.adapter import Output, command
+from tubecert.cli.telling import text_of
 from tubecert.errors import ExitCode
 from tubecert.library import metrics
+from tubecert.library.specification import Specification
+from tubecert.printable import visible
+from tubecert.report.terminal import Terminal
+from tubecert.report.text import Rows, headline
+from tubecert.spec import Setting, Spec, load
 
 if TYPE_CHECKING:
     from tubecert.pipeline.synthesised import Synthesised
-    from tubecert.report.text import Rows
-    from tubecert.spec import Setting, Spec
 
 _WORDS: Final = {
     "spec": SPEC,
@@ -41,13 +46,6 @@ def synth(
     **asked: Any,
 ) -> ExitCode:
     """Find a dual metric, round it, and write it only if C1-C3 are proven on the whole safe set."""
-    from tubecert import certificate
-    from tubecert.cli import telling
-    from tubecert.library.specification import Specification
-    from tubecert.report.terminal import Terminal
-    from tubecert.report.text import headline
-    from tubecert.spec import load
-
     for place in filter(None, (output, plot)):
         certificate.check_target(place)
         telling.spare(place, {"specification": spec})
@@ -83,9 +81,6 @@ def synth(
 
 def _will(so_far: Synthesised, system: Spec, target: str, how: Output) -> keeper.Will | None:
     """What is left of a search that does not come to its end: the best metric, and the report about it."""
-    from tubecert import certificate
-    from tubecert.cli.telling import text_of
-
     if so_far.file is None:
         return None
     metric = metrics.metric_of(so_far, system)
@@ -98,8 +93,6 @@ def _will(so_far: Synthesised, system: Spec, target: str, how: Output) -> keeper
 
 def _closing(metric: metrics.SynthesisedMetric, system: Spec, target: str) -> Rows:
     """What was written and comes next."""
-    from tubecert.printable import visible
-
     if not metric.proven:
         return []
     line = shlex.join(["tubecert", "certify", system.path, "--metric", target])

@@ -20,7 +20,9 @@ from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.progress import Phase, Progress, Step
 from tubecert.report import progress
+from tubecert.report.page import Page
 from tubecert.report.terminal import Terminal
+from tubecert.report.text import Rows, headline, screen
 from tubecert.words.progress import came_to, described, next_step, out_of_reach
 
 if TYPE_CHECKING:
@@ -28,8 +30,6 @@ if TYPE_CHECKING:
     from tubecert.cli.adapter import Output
     from tubecert.library.shown import Shown
     from tubecert.pipeline.synthesised import Row, Synthesised
-    from tubecert.report.page import Page
-    from tubecert.report.text import Rows
     from tubecert.spec import Spec
 
 _EVERY: Final = 0.2  # s between two of the same search
@@ -154,8 +154,6 @@ def present(how: Output, page: Page, closing: Rows = (), data: str | None = None
 
     With `data` the headline is on stderr.
     """
-    from tubecert.report.text import headline
-
     write_stdout(text_of(how, page, closing, data))
     if data is not None and not how.quiet:
         Terminal.stderr(color=how.color).show(headline(page))
@@ -164,8 +162,6 @@ def present(how: Output, page: Page, closing: Rows = (), data: str | None = None
 
 def text_of(how: Output, page: Page, closing: Rows, data: str | None = None) -> str:
     """What `present` writes to stdout."""
-    from tubecert.report.text import headline, screen
-
     if data is not None:
         return data
     shown = [headline(page)] if how.quiet else screen(page, closing, verbose=how.verbose)

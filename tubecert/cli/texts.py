@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from importlib import resources
 from typing import Final
 
 from tubecert.asking import Choice, Text
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.errors import SpecError
+from tubecert.expression import near
+from tubecert.findings import Finding
+from tubecert.libraries import versions
+from tubecert.release import __version__
+from tubecert.report import pages
 
 SCHEMAS: Final = ("spec", "metric", "certificate", "sampled-loop")
 _NAME: Final = Choice("Of what.", "|".join(SCHEMAS), words=SCHEMAS, place=True, optional=True)
@@ -19,8 +25,6 @@ _TOPIC: Final = Text("A code, a constant or an equation.", "TOPIC", place=True, 
 @command({"name": _NAME}, shared=("debug",))
 def schema(how: Output, name: str = "spec") -> None:
     """Show a JSON Schema: of specifications (for editors), of metric files, of certificates, of those with hardware."""
-    from importlib import resources
-
     file = resources.files("tubecert") / "schemas" / f"{name}.schema.json"
     write_stdout(file.read_text(encoding="utf-8"))
 
@@ -28,10 +32,6 @@ def schema(how: Output, name: str = "spec") -> None:
 @command({"topic": _TOPIC}, shared=("debug",))
 def explain(how: Output, topic: str | None = None) -> None:
     """Explain a finding code, a constant or an equation; without a topic, list all that there are."""
-    from tubecert.expression import near
-    from tubecert.findings import Finding
-    from tubecert.report import pages
-
     if topic is None:
         write_stdout("\n".join(_index()) + "\n")
         return
@@ -44,8 +44,6 @@ def explain(how: Output, topic: str | None = None) -> None:
 
 
 def _index() -> Iterator[str]:
-    from tubecert.report import pages
-
     yield "Words of reports"
     yield from (f"  {word:<16} {page.title}" for word, page in pages.words().items())
     yield "\nFinding codes"
@@ -59,9 +57,6 @@ def _index() -> Iterator[str]:
 @command({})
 def version(how: Output) -> None:
     """Show the version; with -v, also those of Python and of the libraries that results rest on."""
-    from tubecert.libraries import versions
-    from tubecert.release import __version__
-
     shown = versions() if how.verbose or how.json else {"tubecert": __version__}
     if how.json:
         write_stdout(json.dumps(shown, indent=1) + "\n")

@@ -6,17 +6,27 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from tubecert import certificate
 from tubecert.asking import ENDING, SETTINGS, Flag, Text, words_of
+from tubecert.cli import telling
 from tubecert.cli.adapter import Output, command
+from tubecert.cli.guard import write_stdout
+from tubecert.cli.telling import refused, spare
 from tubecert.errors import ExitCode, SpecError, TubecertError
+from tubecert.findings import Finding, Location
 from tubecert.library import metrics
+from tubecert.library.specification import Specification
 from tubecert.printable import visible
+from tubecert.progress import Phase
+from tubecert.report.findings import render
+from tubecert.report.terminal import Terminal
+from tubecert.spec import Setting, Spec, load
+from tubecert.spec.metric_file import with_metric
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
     from tubecert.library.metrics import VerifiedMetric
-    from tubecert.spec import Setting, Spec
 
 _METRICS = (".json", ".csv", ".npz", ".mat")
 _WORDS: Final = {
@@ -40,14 +50,7 @@ def verify(
     **asked: Any,
 ) -> ExitCode:
     """Decide C1, C2, C3 of metrics on their safe sets, without plan, uncertainty or tube."""
-    from tubecert import certificate
-    from tubecert.cli import telling
-    from tubecert.cli.guard import write_stdout
-    from tubecert.cli.telling import refused, spare
-    from tubecert.library.specification import Specification
-    from tubecert.progress import Phase
     from tubecert.report import progress, text, verification
-    from tubecert.report.terminal import Terminal
 
     cases = list(_cases(files, asked.get("rate"), settings))
     if output is not None:
@@ -90,8 +93,6 @@ def _closing(found: Sequence[VerifiedMetric], target: str | None) -> str:
 def _as_locked(cases: Sequence[tuple[str, Spec]], found: Sequence[VerifiedMetric], how: Output) -> ExitCode:
     """Certified if every metric is what the section `expect` of its specification says."""
     from tubecert.checking.expectations import metric_compared, outcome_of_metric
-    from tubecert.report.findings import render
-    from tubecert.report.terminal import Terminal
 
     pairs = [(spec, outcome_of_metric(metric.found)) for (_, spec), metric in zip(cases, found, strict=True)]
     if wrong := [each for pair in pairs for each in metric_compared(*pair)]:
@@ -106,9 +107,6 @@ def _cases(
 
     Raises `TubecertError`.
     """
-    from tubecert.spec import load
-    from tubecert.spec.metric_file import with_metric
-
     system: Spec | None = None
     own = [Path(file).suffix.lower() in _METRICS for file in files]
     for file, alone, follows in zip(files, own, [*own[1:], False], strict=True):
@@ -123,8 +121,6 @@ def _cases(
 
 
 def _no_system(file: str) -> TubecertError:
-    from tubecert.findings import Finding, Location
-
     place, message = Location(file=file, line=1, column=1), "a metric needs a system"
     help = "give a specification before it"
     return SpecError([Finding(code="TC105", message=message, location=place, help=help)])

@@ -11,14 +11,18 @@ from typing import TYPE_CHECKING, Final
 
 from tubecert import asking
 from tubecert.asking import Number
+from tubecert.executor import held
 from tubecert.letters import ALL, words_of
+from tubecert.libraries import versions
+from tubecert.library.specification import Specifiable, Specification, require_once, settings_in, spec_of
+from tubecert.library.workers import workers_of
+from tubecert.progress import Progress
+from tubecert.report.progress import timed
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.metrics import MetricLike
     from tubecert.library.sampled import SampledCertification
-    from tubecert.library.specification import Specifiable
-    from tubecert.progress import Progress
 
 BUDGET: Final = asking.Exact("Boxes examined per claim before giving up.", whole=True, of=asking.METRIC)
 DEADLINE: Final = asking.Seconds(
@@ -102,18 +106,14 @@ def certify(
     Returns the certificate whatever the verdict is. Raises `SpecError` for what makes the question meaningless.
     """
     from tubecert.library import sampled
-    from tubecert.library.specification import Specification, require_once, settings_in, spec_of
-    from tubecert.report.progress import timed
 
     whole = spec_of(spec)
     if whole.hardware is not None:
         asking.require_nothing_of_a_metric()
         return sampled.certified(whole, timed(progress))
     from tubecert import certificate, pipeline
-    from tubecert.executor import held
     from tubecert.library.certification import certification_of
     from tubecert.library.metrics import with_metric
-    from tubecert.library.workers import workers_of
     from tubecert.stages.question import Options, overridden
 
     require_once(settings_in(whole))
@@ -142,8 +142,6 @@ def certify(
 
 def ran(function: str) -> Callable[[], Mapping[str, object]]:
     """What is noted of a run that begins now, once it is over: command line, beginning, seconds, versions."""
-    from tubecert.libraries import versions
-
     started, clock = datetime.now(UTC), time.perf_counter()
     return lambda: {
         "command": asking.asker().command or function,

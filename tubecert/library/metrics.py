@@ -7,11 +7,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from tubecert import asking
+from tubecert import asking, certificate
 from tubecert.asking import Number
 from tubecert.errors import ExitCode, SpecError
+from tubecert.findings import Finding, Location
 from tubecert.library.certifying import BUDGET, DEADLINE
 from tubecert.library.shown import Shown
+from tubecert.library.specification import File, Specifiable, require_once, settings_in, spec_of
+from tubecert.progress import Progress
+from tubecert.records import to_json
+from tubecert.report.page import Page
+from tubecert.report.progress import timed
+from tubecert.spec import Spec, Synthesis, metric_file
+from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -19,13 +27,8 @@ if TYPE_CHECKING:
     from tubecert.certificate.result import MetricFile
     from tubecert.enclosure.constant import Constant
     from tubecert.library.plain import Data
-    from tubecert.library.specification import File, Specifiable
     from tubecert.pipeline.synthesised import Synthesised
     from tubecert.pipeline.verification import Verified
-    from tubecert.progress import Progress
-    from tubecert.report.page import Page
-    from tubecert.spec import Spec, Synthesis
-    from tubecert.verdict import Verdict
 
 IN_CODE: Final = "given in code"  # what a certificate calls a metric that is no file
 _BUDGET: Final = 2_000_000  # boxes of a verification
@@ -68,9 +71,6 @@ class _Metric(Shown):
 
     def text(self) -> str:
         """The metric file. Raises `TubecertError` if nothing is proven."""
-        from tubecert import certificate
-        from tubecert.findings import Finding
-
         if self.file is None:
             message = "there is no metric that is proven"
             raise SpecError([Finding(code="TC105", message=message, help="look at its reason")])
@@ -78,8 +78,6 @@ class _Metric(Shown):
 
     def save(self, path: File) -> None:
         """Write the metric file, as `synth` does. Raises `TubecertError` if nothing is proven, `TargetError`."""
-        from tubecert import certificate
-
         certificate.write_text(os.fspath(path), self.text(), "choose another file")
 
 
@@ -109,9 +107,6 @@ class SynthesisedMetric(_Metric):
         return page_of(self.found.search(), self.file, self.name, self.states)
 
     def _json(self) -> str:
-        from tubecert import certificate
-        from tubecert.records import to_json
-
         return certificate.dump(to_json(self.file or self.found.search()))
 
     @property
@@ -154,7 +149,6 @@ def with_metric(spec: Spec, metric: MetricLike, rate: Fraction | None = None) ->
     `rate` stands in for that of coefficients. Raises `TubecertError`.
     """
     from tubecert.library.plain import document_text
-    from tubecert.spec import metric_file
 
     if isinstance(metric, _Metric):
         return metric_file.with_metric_text(spec, metric.text(), f"<{IN_CODE}>"), IN_CODE
@@ -186,9 +180,7 @@ def verify(
     mapping with a system, its safe set and a metric suffices as `spec`. Raises `SpecError` if there is no metric.
     """
     from tubecert.enclosure.branch_and_bound import Effort
-    from tubecert.library.specification import spec_of
     from tubecert.pipeline.verification import verify as decided
-    from tubecert.report.progress import timed
 
     whole, name = spec_of(spec, reads="system"), ""
     if metric is not None:
@@ -202,8 +194,6 @@ def verify(
 def at_rate(spec: Spec, rate: Fraction | None) -> Spec:
     """The specification with another rate of its metric, if one is given; raises `SpecError` if it has no metric."""
     if spec.metric is None:
-        from tubecert.findings import Finding, Location
-
         place, message = Location(file=spec.path, line=1, column=1), "there is no metric to verify"
         help = "give a metric file after the specification (tubecert synth finds one), or metric.dual_metric and rate"
         raise SpecError([Finding(code="TC105", message=message, location=place, help=help)])
@@ -259,8 +249,6 @@ def synth(
     """
     from tubecert import pipeline
     from tubecert.kinds import ALONE, DISTANCE
-    from tubecert.library.specification import require_once, settings_in, spec_of
-    from tubecert.report.progress import timed
 
     system, given = spec_of(spec, reads="plant"), asking.asker().given
     require_once(settings_in(system))
@@ -305,7 +293,6 @@ def wanted_of(
 
     Without a section the rate is that of the specification's own metric. Raises `SpecError` if they do not go together.
     """
-    from tubecert.spec import Synthesis
     from tubecert.spec.metric import solver_name
 
     own = system.synthesis

@@ -13,12 +13,12 @@ from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.reading import certificate_of
 from tubecert.library.shown import Paged
+from tubecert.library.specification import File
+from tubecert.report.page import Page
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
-    from tubecert.library.specification import File
-    from tubecert.report.page import Page
     from tubecert.report.page_simulation import Simulated
     from tubecert.report.quantities import AnyCertificate
 

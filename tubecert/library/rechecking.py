@@ -12,17 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 from tubecert import asking
 from tubecert.asking import Number
+from tubecert.certificate.file import FORMAT, KIND, incomplete, parse, unreadable
 from tubecert.errors import ExitCode
+from tubecert.files import STDIN, read, read_stdin
 from tubecert.library.shown import Shown
+from tubecert.printable import printable_json
+from tubecert.progress import Phase, Progress, Step
+from tubecert.records import FormError
+from tubecert.report.page import Page
+from tubecert.report.progress import timed
+from tubecert.report.text import Rows
 
 if TYPE_CHECKING:  # of the producer, which takes longer to import than many certificates to examine
     from tubecert.library.specification import File, Specifiable
     from tubecert.library.stated import Stated
-    from tubecert.progress import Progress
     from tubecert.recheck.document import Node
     from tubecert.recheck.run import Examined, Recheck, Report
-    from tubecert.report.page import Page
-    from tubecert.report.text import Rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -67,8 +72,6 @@ class Rechecked(Shown):
         return [("more", f"-v here; {report}: what is certified, as a page with figures")]
 
     def _json(self) -> str:
-        from tubecert.printable import printable_json
-
         claims = [
             {"claim": each.name, "verdict": each.outcome.verdict, "why": each.outcome.why, "boxes": each.outcome.boxes}
             for each in self.claims
@@ -115,7 +118,6 @@ def recheck(
     """
     from tubecert.recheck.run import BUDGET
     from tubecert.recheck.run import recheck as examined
-    from tubecert.report.progress import timed
 
     if isinstance(text := getattr(result, "text", None), str):
         name = str(getattr(result, "name", ""))
@@ -139,7 +141,6 @@ def recheck(
 
 def _specified(text: str, name: str, spec: Specifiable) -> str:
     """A sentence that says that the certificate is of the specification; raises TC604 if it is not."""
-    from tubecert.certificate.file import FORMAT, parse
     from tubecert.library import sampled
     from tubecert.library.specification import spec_of
     from tubecert.recheck import document
@@ -156,11 +157,9 @@ def _specified(text: str, name: str, spec: Specifiable) -> str:
 def belongs(document: Node, name: str, spec: Specifiable) -> str:
     """The same of the certificate of a loop that rests on a metric."""
     from tubecert.certificate.belonging import compared
-    from tubecert.certificate.file import incomplete
     from tubecert.certificate.result import Result
     from tubecert.library.specification import spec_of
     from tubecert.recheck.certificate import opened, read_result
-    from tubecert.records import FormError
 
     read_result(opened(document)[0])  # its form: what is compared below is there, and is what is examined
     loaded = spec_of(spec)
@@ -192,9 +191,6 @@ def _with_controller(found: Recheck, text: str, name: str, folder: str) -> Reche
 
 def _text_of(name: str) -> str:
     """The text of a certificate's file (`-`: on stdin). Raises `TargetError`."""
-    from tubecert.certificate.file import KIND, unreadable
-    from tubecert.files import STDIN, read, read_stdin
-
     data = read_stdin(KIND) if name == STDIN else read(name, KIND)
     try:
         return data.decode()
@@ -210,8 +206,6 @@ def _heard(found: Callable[[str], None], item: Examined) -> None:
 
 def _told(progress: Progress) -> Report:
     """What recheck, which shares no record with the rest, tells its progress to."""
-    from tubecert.progress import Phase, Step
-
     return lambda claim, done, of, boxes, share: progress(
         Step(phase=Phase.RECHECK, name=claim, done=done, of=of, count=boxes, share=share)
     )

@@ -11,21 +11,26 @@ from typing import TYPE_CHECKING, Final, cast
 from tubecert import asking
 from tubecert.asking import Number
 from tubecert.errors import SpecError, TubecertError
+from tubecert.executor import Serial
 from tubecert.findings import Finding
 from tubecert.letters import ADAPTIVE, DISTANCE, name_of, words_of
 from tubecert.library.certifying import SCHEDULER
+from tubecert.library.reading import certificate_of
+from tubecert.library.specification import File, Specifiable, spec_of
+from tubecert.library.workers import workers_of
+from tubecert.progress import Progress
+from tubecert.report.progress import timed
+from tubecert.spec import Simulation as Section
+from tubecert.spec import Spec
 
 if TYPE_CHECKING:
     from tubecert.certificate.result import Result
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
     from tubecert.library.simulation import SampledSimulation, Simulation
-    from tubecert.library.specification import File, Specifiable
-    from tubecert.progress import Progress
     from tubecert.simulation.adaptive.families import Drawing
     from tubecert.simulation.adaptive.loops import Controller
     from tubecert.simulation.adaptive.setting import Setting
-    from tubecert.spec import Spec
 
 EXTRA: Final = "matplotlib"
 RUNS: Final = 100
@@ -85,23 +90,17 @@ def simulate(
     `spec` is needed where the certificate was read and its plan is in a file. Needs the extra `simulate`. Raises
     `TubecertError` if there is no tube that could be left, or if the specification is another one.
     """
-    from tubecert.library.reading import certificate_of
     from tubecert.library.sampled import SampledCertification
-    from tubecert.library.specification import spec_of
-    from tubecert.report.progress import timed
 
     found = certificate_of(result)
     system = _certified(found) if spec is None else spec_of(spec)
     require_ready(system)
     if isinstance(found, SampledCertification):
         return _sampled(found, system, timed(progress), duration=asking.exact(duration), runs=runs, seed=seed)
-    from tubecert.executor import Serial
     from tubecert.library.simulation import Simulation
-    from tubecert.library.workers import workers_of
     from tubecert.simulation.adaptive import campaign, families
     from tubecert.simulation.adaptive.reading import adopted, require_tube
     from tubecert.simulation.adaptive.setting import Choice, loop_of
-    from tubecert.spec import Simulation as Section
 
     default, system = system.simulation or Section(), adopted(system, found.result)
     require_tube(found.result)
@@ -193,7 +192,6 @@ def _sampled(
     from tubecert.library.simulation import SampledSimulation
     from tubecert.simulation.sampled.campaign import simulate as campaign
     from tubecert.simulation.sampled.setting import setting_of
-    from tubecert.spec import Simulation as Section
 
     result = found.result
     if not result.tube or result.controller is None or result.nominal is None:

@@ -11,25 +11,40 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from tubecert import asking
+from tubecert import asking, certificate
 from tubecert.asking import Number
 from tubecert.errors import ExitCode, SpecError
+from tubecert.executor import chosen
 from tubecert.findings import Finding
 from tubecert.library.certifying import BUDGET, DECIDING, METRIC_NAME, SCHEDULER
+from tubecert.library.reading import read
 from tubecert.library.shown import Shown
+from tubecert.library.specification import (
+    NAME,
+    File,
+    Specifiable,
+    require_once,
+    settings_in,
+    settings_of,
+    source_of,
+)
+from tubecert.library.workers import cluster_at
+from tubecert.printable import printable_json
+from tubecert.progress import Progress
+from tubecert.records import exact_json
+from tubecert.report.html import render_page
+from tubecert.report.page import Page
+from tubecert.report.progress import timed
+from tubecert.report.text import Rows
+from tubecert.spec import Setting
 
 if TYPE_CHECKING:
     from tubecert.enclosure.interval import Array
     from tubecert.library.certification import Certification
     from tubecert.library.plain import Data
     from tubecert.library.sampled import SampledCertification
-    from tubecert.library.specification import File, Specifiable
-    from tubecert.progress import Progress
-    from tubecert.report.page import Page
     from tubecert.report.quantities import Value
     from tubecert.report.sweep import Row, SweepTable
-    from tubecert.report.text import Rows
-    from tubecert.spec import Setting
     from tubecert.sweep.grid import Axis
     from tubecert.sweep.run import Sweep
 
@@ -67,8 +82,6 @@ class SweptPoint:
 
     def certification(self) -> Certification | SampledCertification:
         """The certificate; raises `TargetError` where there is none."""
-        from tubecert.library.reading import read
-
         return read(self.file)
 
 
@@ -130,9 +143,6 @@ class Swept(Shown):
         )
 
     def _json(self) -> str:
-        from tubecert.printable import printable_json
-        from tubecert.records import exact_json
-
         cells = (
             [exact_json(each) if isinstance(each, Fraction) else each for each in row]
             for row in self.table.cells()
@@ -188,11 +198,7 @@ def sweep(
 
     Raises `SpecError` where no point has a specification that can be read, `TargetError` for a folder of another sweep.
     """
-    from tubecert.executor import chosen
-    from tubecert.library.specification import NAME, require_once, settings_in, settings_of, source_of
-    from tubecert.library.workers import cluster_at
     from tubecert.pipeline import Options
-    from tubecert.report.progress import timed
     from tubecert.report.sweep import SweepTable
     from tubecert.sweep.point import Task
     from tubecert.sweep.run import Sweep
@@ -249,10 +255,8 @@ def _range(key: str, values: Range) -> str:
 
 def _written(folder: Path, table: SweepTable) -> tuple[str, ...]:
     """Write table, page and figures; their names. Raises `TargetError`."""
-    from tubecert import certificate
     from tubecert.report.figures_file import svg_file
     from tubecert.report.figures_sweep import sweep_figures
-    from tubecert.report.html import render_page
     from tubecert.report.sweep import page_of
 
     texts = {"table.csv": table.csv()}
