@@ -110,6 +110,26 @@ def test_a_false_word_beside_a_true_refutation_is_not_confirmed(name):
     assert believed <= MAY_DIFFER.get(name, set())
 
 
+def test_a_start_is_compared_in_states_not_in_outputs():
+    """A start within 0.4 is at most 0.04 off in a tenth of a state: 0.05 that is asked for of it is not missed."""
+    text = SMALL.replace("epsilon: 0.2, rho_a: 0.1", "half_widths: {x: 0.45, tenth: 0.05}")
+    made = certified(
+        text.replace("  B: ", "  outputs: {tenth: 0.1*x}\n  B: ").replace(
+            START, "initial_state: {within: 0.4}"
+        )
+    )
+    assert made["result"]["verdict"] == "certified"
+    told = {
+        "claim": "start_in_tube",
+        "state": "tenth",
+        "off": 0.4,
+        "half_width": "0.05",
+        "at": {"t": 0, "x": []},
+    }
+    made["result"] |= {"verdict": "refuted", "reasons": [{**told, "verdict": "refuted"}]}
+    assert unconfirmed(made)
+
+
 def test_what_nothing_examines_in_a_refuted_certificate_is_listed():
     made = certified(MOVING + "limits: {u: [-2, 0.28]}\n")
     assert made["result"]["distance"]["verdict"] == "certified"

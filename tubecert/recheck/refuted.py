@@ -236,7 +236,7 @@ def _too_wide(told: _Told) -> Outcome:
 def _starts_outside(told: _Told) -> Outcome:
     """A state starts farther from the plan's than the half-width that is asked for."""
     s, asked, off = told.case.system, told.case.result.specification.half_widths, told.parameters["off"]
-    name = told.word("state", *asked)
+    name = told.word("state", *(state for state in s.states if state in asked))
     told.same("half_width", asked[name])
     if s.within is not None:
         told.close("off", off, exact(s.within))
