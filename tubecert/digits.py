@@ -16,6 +16,7 @@ from tubecert.records import exact_json
 Number = float | int | str | Fraction
 UNKNOWN: Final = "-"
 _LONG: Final = 16
+_FRACTION: Final = 5
 _DEGREE: Final = Fraction("3.14159265358979323846264338327950288") / 180
 
 
@@ -51,8 +52,13 @@ def exact(value: Number | None) -> str:
 
 
 def end(value: Number | None) -> str:
-    """An end of a range: exact, but for multiples of pi, of which the certificate holds 30 digits: in degrees."""
+    """An end of a range: exact, but for fractions of large numbers, and for multiples of pi: in degrees.
+
+    Of these the certificate holds 30 digits.
+    """
     text = exact(value)
+    if "/" in text and len(text) > _FRACTION:
+        return short(Fraction(text), 9)
     if len(text) <= _LONG:
         return text
     degrees = short(Fraction(text) / _DEGREE, 8)

@@ -9,6 +9,7 @@ from systems import SMALL
 
 from tubecert.certificate.result import Certificate
 from tubecert.claims.conditions import SECTIONS
+from tubecert.digits import end
 from tubecert.kinds import NAMES
 from tubecert.report import pages, text
 from tubecert.report.certificate_page import page_of
@@ -122,3 +123,7 @@ def test_every_word_has_meaning_and_source(word):
 def test_numbers_say_their_unit():
     for word in ("rho", "rho_a", "epsilon", "half-width", "omega", "Gamma", "rate", "h", "noise"):
         assert "\n\nUnit: " in pages.words()[word].text()
+
+
+def test_a_fraction_of_large_numbers_is_shown_as_a_decimal():
+    assert [end(Fraction(q)) for q in ("-10519/12545", "1/3", "0.15")] == ["-0.838501395", "1/3", "0.15"]
