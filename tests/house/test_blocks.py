@@ -181,9 +181,9 @@ def understood(command: str) -> None:
         assert program in {"python3", ".venv/bin/pip", ".venv/bin/python", "dask"}, command
         return
     group = typer.main.get_command(app)
-    name, *rest = arguments
-    known = group.commands[name]  # type: ignore[attr-defined]
-    known.make_context(name, rest, parent=group.make_context("tubecert", [name]))
+    whole = group.make_context("tubecert", arguments[:1])
+    name, known, rest = group.resolve_command(whole, arguments)  # type: ignore[attr-defined]
+    known.make_context(name, rest, parent=whole)
 
 
 class Reader:

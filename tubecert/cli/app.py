@@ -10,7 +10,7 @@ import typer
 import typer.core
 
 from tubecert.cli.adapter import OUTPUT, Output, command_of, said, with_options
-from tubecert.cli.guard import flush_stdout, refuse_usage, stdout_failed
+from tubecert.cli.guard import flush_stdout, guarded, refuse_usage, stdout_failed
 from tubecert.errors import ExitCode
 
 # ClickException: typer has a click of its own, or uses click's
@@ -24,7 +24,8 @@ class Commands(typer.core.TyperGroup):
         """The command that is called, and what it is called with."""
         if args and args[0] in self.commands:
             alone = typer.Typer(rich_markup_mode=None, add_completion=False)
-            command_of(args[0]).add(alone, args[0])
+            with guarded(Output()):
+                command_of(args[0]).add(alone, args[0])
             self.commands[args[0]] = typer.main.get_command(alone)
         return super().resolve_command(ctx, args)
 
