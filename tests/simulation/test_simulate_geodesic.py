@@ -31,9 +31,9 @@ def connected(geodesics, p, *ends):
 
 
 def solved(system, p, q, degree=5):
-    """The geodesic of one lane, once more from itself: status, energy, M gamma_s at both ends (2, n)."""
+    """The geodesic of one lane, at last from itself: status, energy, M gamma_s at both ends (2, n)."""
     geodesics = Geodesics(system, degree, 1)
-    first, found = (connected(geodesics, p, q) for _ in range(2))
+    first, _, found = (connected(geodesics, p, q) for _ in range(3))
     assert found.energy == pytest.approx(first.energy, rel=1e-11)
     return found.status[0], found.energy[0], np.array([found.start[:, 0], found.end[:, 0]])
 

@@ -66,12 +66,17 @@ class _Curve(NamedTuple):
 
 
 class Geodesics:
-    """Those of N lanes; `a` (n, K, N) are the coefficients of the last ones, from which the next start."""
+    """Those of N lanes, at stages of Runge-Kutta steps one after the other.
+
+    `a` (n, K, N) are the coefficients of the last ones, from which the next start. At every second stage time has gone
+    on by half a step: there the coefficients go on as they did half a step before, three stages ago.
+    """
 
     def __init__(self, model: ControlAffineModel, degree: int, lanes: int) -> None:
         n, used = len(model.states), free_symbols(e for row in model.W for e in row)
         self._moving, self._calls = [i for i, name in enumerate(model.states) if name in used], 0
         self.a = np.zeros((n, degree - 1, lanes))
+        self._before = [self.a] * 2
         v, m = ([f"{of}#{i}" for i in range(n)] for of in "vm")
         slopes, bent = dict[str, Expression](), list[Expression]()
         for i in self._moving:
@@ -102,7 +107,8 @@ class Geodesics:
             m = self._M @ span
             status = np.zeros(q.shape[1], dtype=np.int64)
             return Geodesic(status, np.einsum("in,in->n", span, m), m, m, self.a)
-        found = self._descended(p, span, self.a, newton=False)
+        ahead = 2 * self.a - self._before[0] if self._calls % 2 else self.a
+        found = self._descended(p, span, ahead, newton=False)
         self._calls += 1
         if self._calls % _WATCHED == 1:
             straight = self._expand(p, span, np.zeros_like(self.a)).energy
@@ -111,7 +117,7 @@ class Geodesics:
             left = np.flatnonzero(found.status)
             for some in np.array_split(left, -(-len(left) // _TOGETHER)):
                 _put(found, some, self._newton(_some(p, some), span[:, some], self.a[:, :, some]))
-        self.a = found.a
+        self._before, self.a = [self._before[1], self.a], found.a
         return found
 
     def _newton(self, p: Array, span: Array, before: Array) -> Geodesic:
