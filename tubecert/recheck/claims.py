@@ -161,15 +161,21 @@ class Case:
 
 def of_every(result: Result) -> Iterator[Claim]:
     """What every certificate says of itself, whatever its verdict."""
-    yield Claim("the specification and what repeats it", None, partial(consistency.specification, result))
+    yield Claim(
+        "the specification and what repeats it",
+        None,
+        partial(consistency.first, consistency.specification, result),
+    )
     yield Claim("the claim is that of the specification", None, partial(consistency.claimed, result))
-    yield Claim("bounds are intervals", None, partial(consistency.bounds, result))
+    yield Claim("bounds are intervals", None, partial(consistency.first, consistency.bounds, result))
 
 
 def of_certified(case: Case) -> Iterator[Claim]:
     """Every claim that a verdict `certified` rests on, and those that stand beside it."""
     result = case.result
-    yield Claim("the verdict follows from the sections", None, partial(consistency.verdict, result))
+    yield Claim(
+        "the verdict follows from the sections", None, partial(consistency.first, consistency.verdict, result)
+    )
     yield Claim("assumptions are complete", None, lambda: consistency.assumptions(result, case.system))
     yield from _on_set(case)
     yield from _tube(case)

@@ -10,12 +10,13 @@ horizon), on which set the metric is one, from which start, against which uncert
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import fields
 
 from tubecert.recheck import clearances, inputs
 from tubecert.recheck.cover import CONFIRMED, Outcome, stated
 from tubecert.recheck.document import Enclosure
+from tubecert.recheck.kinds.kind import Statements
 from tubecert.recheck.kinds.table import KINDS
 from tubecert.recheck.monomials import degree
 from tubecert.recheck.reasons import Assumption
@@ -32,12 +33,8 @@ _CLAIMS_ONLY = "the verdict is certified, but"
 _CURVE = "hermite"  # between knots x* is the cubic whose slopes at its ends are f(x*) + B(x*) u*
 
 
-def specification(result: Result) -> Outcome:
+def specification(result: Result) -> Statements:
     """What is repeated from the specification is the same there."""
-    return _first(_specification(result))
-
-
-def _specification(result: Result) -> Iterator[tuple[bool, str]]:
     spec, metric, tube, plan = result.specification, result.metric, result.tube, result.plan
     yield result.effective_hash == spec.hash, "spec.effective_hash is not that of spec.effective"
     yield result.safe_set == spec.plant.safe_set, "safe_set is not that of the specification"
@@ -72,7 +69,7 @@ def _rescaled(name: str, tube: TubeSection | None) -> bool:
     return name == "h_x" and tube is not None and tube.coordinates is not None
 
 
-def _tube(tube: TubeSection, spec: Specification) -> Iterator[tuple[bool, str]]:
+def _tube(tube: TubeSection, spec: Specification) -> Statements:
     for name, own, given in (("epsilon", tube.epsilon, spec.epsilon), ("rho_a", tube.rho_a, spec.rho_a)):
         # within half-widths, rho_a may be more than there is room for
         asked = given is not None and not (name == "rho_a" and spec.half_widths and own < given)
@@ -87,7 +84,7 @@ def _tube(tube: TubeSection, spec: Specification) -> Iterator[tuple[bool, str]]:
         yield widths is None or widths[name] <= most, f"tube.half_widths.{name} is more than was asked for"
 
 
-def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
+def _overrides(result: Result) -> Statements:
     given, spec, sections = result.overrides, result.specification, result.sections
     for name, own, value in (("epsilon", given.epsilon, spec.epsilon), ("rho_a", given.rho_a, spec.rho_a)):
         yield own in (None, value), f"overrides.{name} is not what spec.effective has"
@@ -100,7 +97,7 @@ def _overrides(result: Result) -> Iterator[tuple[bool, str]]:
             yield from kind.asked(sections[kind.key], given.gains)
 
 
-def _synthesised(result: Result) -> Iterator[tuple[bool, str]]:
+def _synthesised(result: Result) -> Statements:
     """A metric that was synthesised is what was asked for: rate, states, degree, how ill-conditioned it may be."""
     asked, metric, own = result.synthesised, result.metric, result.specification.metric
     if isinstance(own, Wanted):
@@ -122,12 +119,8 @@ def _synthesised(result: Result) -> Iterator[tuple[bool, str]]:
         yield serves, "the condition number of the metric is larger than what was asked for"
 
 
-def bounds(result: Result) -> Outcome:
+def bounds(result: Result) -> Statements:
     """Every constant is an interval; those of the metric agree with the section on it."""
-    return _first(_bounds(result))
-
-
-def _bounds(result: Result) -> Iterator[tuple[bool, str]]:
     constants, metric = result.constants or {}, result.metric
     for name, value in constants.items():
         yield value.is_interval, f"constants.{name} is not an interval"
@@ -146,12 +139,8 @@ def _bounds(result: Result) -> Iterator[tuple[bool, str]]:
         yield pair is None or pair.is_interval, f"metric.{name} is not an interval"
 
 
-def verdict(result: Result) -> Outcome:
+def verdict(result: Result) -> Statements:
     """The verdict is that of the sections that decide it, and so are its reasons."""
-    return _first(_verdict(result))
-
-
-def _verdict(result: Result) -> Iterator[tuple[bool, str]]:
     sections, metric = result.sections, result.metric
     assert sections is not None
     assert metric is not None
@@ -242,11 +231,9 @@ def _geodesics(s: System, test: Geodesics | None) -> Assumption:
     return Assumption("exact_geodesics", {"uniqueness": uniqueness, "value": test.value})
 
 
-def _first(statements: Iterator[tuple[bool, str]]) -> Outcome:
-    for holds, why in statements:
-        if not holds:
-            return stated(False, why)
-    return CONFIRMED
+def first(statements: Callable[[Result], Statements], result: Result) -> Outcome:
+    """All of them, or the first that is not so."""
+    return next((stated(False, why) for holds, why in statements(result) if not holds), CONFIRMED)
 
 
 def own_claim(spec: Specification) -> Claim:

@@ -15,7 +15,7 @@ from fractions import Fraction
 from tubecert.recheck.balls import Ball, exact, length
 from tubecert.recheck.cover import CONFIRMED, Outcome, stated
 from tubecert.recheck.curve import Knots
-from tubecert.recheck.document import Members, Node
+from tubecert.recheck.document import Members, Node, may, one_of, reads
 from tubecert.recheck.specification import Specification
 from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Planned, Resting, Tabled
 
@@ -24,12 +24,12 @@ from tubecert.recheck.specified.trajectory import AnyPlan, Expressed, Planned, R
 class Plan:
     """The plan as it was certified: `interpolation` is None where a certification ended before there was one."""
 
-    kind: str
-    interpolation: str | None
-    curve: str | None
-    knots: Knots | None
-    file: str | None
-    file_hash: str | None
+    kind: str = reads(Node.text)
+    interpolation: str | None = may(one_of("exact", "hold", "linear", "hermite-simpson"))
+    curve: str | None = may(Node.text)
+    knots: Knots | None = None
+    file: str | None = may(Node.text)
+    file_hash: str | None = may(Node.text)
 
 
 def read_plan(node: Node, specification: Specification) -> Plan:
@@ -41,26 +41,16 @@ def read_plan(node: Node, specification: Specification) -> Plan:
     if isinstance(specification.trajectory, Tabled):
         optional += ["file", "file_hash"]
     own = node.closed("kind", optional=optional)
-    knots = own.get("knots", lambda item: read_knots(item.closed("t", "x", "u"), n, m, Node.exact))
     if "interpolation" in own:
         own.require(*optional)
-    return Plan(
-        kind=own["kind"].text(),
-        interpolation=own.get(
-            "interpolation", lambda item: item.word("exact", "hold", "linear", "hermite-simpson")
-        ),
-        curve=own.get("curve", Node.text),
-        knots=knots,
-        file=own.get("file", Node.text),
-        file_hash=own.get("file_hash", Node.text),
-    )
+    return node.record(Plan, knots=lambda item: read_knots(item.closed("t", "x", "u"), n, m, Node.exact))
 
 
-def read_knots(own: Members, n: int, m: int, reads: Callable[[Node], Fraction]) -> Knots:
+def read_knots(own: Members, n: int, m: int, how: Callable[[Node], Fraction]) -> Knots:
     """`t`, `x` and `u` of an object, row by row; what lies between is not known yet."""
-    t = tuple(map(reads, own["t"].entries()))
+    t = tuple(map(how, own["t"].entries()))
     x, u = (
-        tuple(tuple(map(reads, row)) for row in own[key].rows(len(t), size))
+        tuple(tuple(map(how, row)) for row in own[key].rows(len(t), size))
         for key, size in (("x", n), ("u", m))
     )
     return Knots(t=t, x=x, u=u)

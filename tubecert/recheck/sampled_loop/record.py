@@ -195,10 +195,10 @@ def _plan(own: Members, spec: SampledSpecification) -> Plan:
     if not isinstance(spec.trajectory, (Planned, Tabled)):
         if "planned" in own:
             raise own["planned"].refused("is not known in this place")
-        return Plan(kind, None, None, None, None, None)
+        return Plan(kind)
     part = own["planned"].closed("t", "x", "u", "interpolation")
     knots = read_knots(part, len(plant.states), len(plant.inputs), Node.decimal)
-    return Plan(kind, part["interpolation"].text(), None, knots, None, None)
+    return Plan(kind, part["interpolation"].text(), knots=knots)
 
 
 def _ends(node: Node) -> Range:
