@@ -79,13 +79,12 @@ class _Campaign(Shown):
 
         Raises `TargetError`.
         """
-        from tubecert.simulation.folder import prepared
+        from tubecert.simulation.folder import prepared, written_to
 
+        own = import_module(self.drawn_in)
         with prepared(os.fspath(folder)):
-            return self._written(os.fspath(folder))
-
-    def _written(self, folder: str) -> list[str]:
-        raise NotImplementedError
+            outdated = [f"{name}.png" for name in own.DRAWERS]
+            return written_to(os.fspath(folder), self.summary, own.files(self.campaign), outdated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -120,11 +119,6 @@ class Simulation(_Campaign):
         """The states (K, n) of that run."""
         return np.asarray(self.run(controller).x[0])
 
-    def _written(self, folder: str) -> list[str]:
-        from tubecert.simulation.adaptive.figures import write
-
-        return write(folder, self.campaign, certificate=self.compared_with)
-
     def _page(self) -> Page:
         from tubecert.report.simulation import page_of
 
@@ -147,12 +141,6 @@ class SampledSimulation(_Campaign):
     def summary(self) -> Json:
         """Everything that was found, as plain data; there is none before the first runs are finished."""
         return self.campaign.summary
-
-    def _written(self, folder: str) -> list[str]:
-        from tubecert.simulation.folder import written_to
-        from tubecert.simulation.sampled.figures import DRAWERS, files
-
-        return written_to(folder, self.summary, files(self.campaign), [f"{name}.png" for name in DRAWERS])
 
     def _page(self) -> Page:
         from tubecert.report.sampled_simulation import page_of

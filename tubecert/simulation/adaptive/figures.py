@@ -15,7 +15,7 @@ from tubecert.simulation.adaptive.loops import Runs
 from tubecert.simulation.adaptive.setting import Loop, Setting
 from tubecert.simulation.figures import COLORS, TUBE, blank, images, labelled, names_of, titled
 from tubecert.simulation.figures import plane as plane_of
-from tubecert.simulation.folder import npz, written_to
+from tubecert.simulation.folder import npz
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,16 +31,8 @@ _SHAPES: Final = 400  # cross-sections of the tube that are drawn
 _FARTHEST: Final = 5.0  # shares of the tube that are drawn
 
 
-def write(folder: str, campaign: Campaign, *, certificate: str) -> list[str]:
-    """Writes every file of a campaign; returns their names. Raises `TargetError`.
-
-    Earlier figures that are not replaced do not stay: to draw takes seconds, which an interruption does not leave.
-    """
-    data, outdated = campaign.summary(certificate), [f"{name}.png" for name in DRAWERS]
-    return written_to(folder, data, _files(campaign), outdated)
-
-
-def _files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
+def files(campaign: Campaign) -> Iterator[tuple[str, bytes]]:
+    """Beside its summary, figures only of what was not interrupted: to draw takes seconds."""
     yield "runs.npz", npz(dict(_arrays(campaign)))
     if not campaign.interrupted:
         yield from figures(campaign)
