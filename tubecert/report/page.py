@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final, Literal
+from typing import TYPE_CHECKING, ClassVar, Final, Literal
 
-from tubecert.report.figures_axes import Chart
 from tubecert.verdict import Verdict
+
+if TYPE_CHECKING:  # who shows a page need not draw
+    from tubecert.report.figures_axes import Chart
 
 Kind = Literal["text", "number", "code", "verdict"]
 _KINDS: Final[Mapping[str, Kind]] = {">": "number", "!": "verdict"}
