@@ -59,7 +59,7 @@ def others(value):
     if isinstance(value, str):
         yield WORDS[value]
     elif isinstance(value, (int, float)):
-        yield from (value + 0.01, value - 0.01, -value - 1, 1e300)
+        yield from (value + 0.01, value - 0.01, -value - 1, 1e300, None)
 
 
 def numbers(reason):

@@ -113,10 +113,12 @@ class _Told:
         if self.parameters[key] != own:
             raise _AnotherError(f"{key} is another one")
 
-    def close(self, what: str, told: Fraction, own: Ball, ends: Range = (Fraction(0), Fraction(0))) -> None:
-        """A number is the one that is found, on the scale of a range."""
+    def close(
+        self, what: str, told: Fraction | None, own: Ball, ends: Range = (Fraction(0), Fraction(0))
+    ) -> None:
+        """A number is there, and the one that is found, on the scale of a range."""
         far = exact(_CLOSE) * (abs(own) + exact((ends[1] - ends[0]) / 1000))
-        if not abs(exact(told) - own) <= far:
+        if told is None or not abs(exact(told) - own) <= far:
             raise _AnotherError(f"{what} is not {float(own.mid()):.9g}")
 
     @property
