@@ -17,7 +17,7 @@ from scipy.linalg import null_space, orth
 from tubecert.enclosure.interval import Array
 from tubecert.loop_design.observer import Observer, observe
 from tubecert.loop_design.plant import Plant, in_units
-from tubecert.loop_design.widths import STILL, Response, respond, rest_at, settle, spread
+from tubecert.loop_design.widths import STILL, Response, respond, rest_at, settle, sizes, spread
 from tubecert.sampled_loop.record import Tables
 
 COARSE = (10.0, 3.0)  # factors on groups of weights
@@ -81,7 +81,7 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
     if (reached := search.response(weights)) is None:
         raise NoDesign("no_design")
     theta, response = reached
-    alone = response.ever + response.gain @ search.constant
+    alone = sizes(own, response.ever + response.gain @ search.constant)
     needed = alone[len(s) :] * u
     if (needed > plant.room).any():
         j = int(np.argmax(needed - plant.room))
@@ -205,7 +205,8 @@ class _Search:
         if (found := self.response(weights)) is None:
             return None
         response, plant, n = found[1], self.plant, self.n
-        alone, late = (rows + response.gain @ self.constant for rows in (response.ever, response.long_run))
+        known = response.gain @ self.constant
+        alone, late = (sizes(plant, rows + known) for rows in (response.ever, response.long_run))
         if not steps:
             return _Reached(response.lags, np.array([alone, late])[:, :n], alone[n:])
         gain = SPARE * response.gain
@@ -215,8 +216,8 @@ class _Search:
                 response.lags, np.array([late, late])[:, :n], alone[n:], spread(plant, gain, alone)
             )
         rest = rest_at(plant, late)
-        first = response.ever + gain @ rest
-        ever = response.ever + gain @ (0.5 * rest + 0.5 * rest_at(plant, first))
+        first = sizes(plant, response.ever + gain @ rest)
+        ever = sizes(plant, response.ever + gain @ (0.5 * rest + 0.5 * rest_at(plant, first)))
         return _Reached(response.lags, np.array([ever, late])[:, :n], ever[n:])
 
     def value(self, weights: Array) -> float:
