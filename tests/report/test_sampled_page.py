@@ -28,7 +28,7 @@ from tubecert.sampled_loop.record import (
     read,
 )
 from tubecert.verdict import Verdict
-from tubecert.words.sampled_loop import NOTHING, filling, percents, remedy, why
+from tubecert.words.sampled_loop import NOTHING, SHARES, filling, percents, remedy, why
 
 TEXTS = {"cart": sampled.SPEC, "family": sampled.FAMILY, "drone": sampled.DRONE}
 OF_CART = sampled.certificate().result.spec.effective
@@ -104,16 +104,16 @@ def test_explain_knows_every_label(name):
     lines = shown(sampled.certificate(TEXTS[name])).splitlines()[1:-4]
     labels = {match[1] for line in lines if (match := re.match(r"  ([a-z]+)(?: [a-z])?  ", line))}
     assert {"loop", "start", "tube", "obstacles"} <= labels
-    causes = {cause.rsplit(" ", 2)[0] for cause in filling(sampled.WIDE).split(", ")}
+    causes = {cause.rsplit(" ", 2)[0] for cause in filling(sampled.WIDE, SHARES).split(", ")}
     assert not [word for word in {*labels, *causes, "wish", "room"} if explained.find(word) is None]
 
 
 @given(st.builds(Shares, **dict.fromkeys(asdict(sampled.WIDE), st.floats(0, 1e6))))
 def test_shares_add_up(shares):
-    found = percents(shares)
+    found = percents(shares, SHARES)
     assert sum(found.values()) == (100 if sum(asdict(shares).values()) >= NOTHING else 0)
     assert all(part > 0 for part in found.values())
-    assert filling(shares).count("%") == len(found)
+    assert filling(shares, SHARES).count("%") == len(found)
 
 
 @given(st.fractions(-8, 8), st.fractions(-8, 8))
@@ -175,6 +175,21 @@ def test_a_plan_that_misses_its_own_equations_is_told_on_the_first_screen(missed
     text = shown(replace(certificate, notes=replace(certificate.notes, missed=missed)))
     assert f"  plan        {told}" in text
     assert len(text.splitlines()) <= 15
+
+
+def test_wind_of_a_bounded_rate_is_told_as_that():
+    """It is compensated as h is: its share was told to be that of h, and nothing said that its rate is assumed."""
+    slow = replace(sampled.NARROW, uncertainty=0.02, wind=0.0)
+    filled = {"long_run": {"p": slow, "v": slow}}
+    for rate, cause, within in (
+        ("", "h", "wind is"),
+        (", rate: 0.1", "h and slow wind", "wind and its rate are"),
+    ):
+        own = sampled.certificate(sampled.SPEC.replace("bound: 0.05", f"bound: 0.05{rate}"))
+        text = shown(replace(own, notes=replace(own.notes, **filled)), verbose=True)
+        assert f"fills p     {cause} 59 %," in text
+        assert f"the {within} within" in " ".join(text.split())
+    assert "h and slow wind" in remedy(LACKS["wish"], own.result.spec.effective, Notes(**filled))
 
 
 def figures_of(page):

@@ -17,11 +17,12 @@ from tubecert.report.figures_axes import BOTTOM, TOP, Axis, Chart, Point
 from tubecert.report.figures_scene import Plane, labelled, over_time
 from tubecert.sampled_loop.record import Certificate, Result, Shares
 from tubecert.verdict import Verdict
-from tubecert.words.sampled_loop import SHARES, percents
+from tubecert.words.sampled_loop import SHARES, WITH_WIND, causes, percents
 
 _FOR_EVER: Final = 1.0  # s that are drawn of a plan without an end, beyond the start of the last stage
 _ROW: Final = 30  # units of the viewport that a bar takes
-_STYLES: Final = dict(zip(SHARES.values(), ("n1", "n4", "n2", "n3", "n5", "n6"), strict=True))
+_NAMES: Final = ("n1", "n4", "n2", "n3", "n5", "n6")
+_STYLES: Final = {**dict(zip(SHARES.values(), _NAMES, strict=True)), WITH_WIND: "n2"}
 
 
 def period(result: Result) -> Fraction:
@@ -61,7 +62,8 @@ def figures(certificate: Certificate) -> Iterator[Chart]:
     if result.tube and result.spec.effective.trajectory.kind != "equilibrium":
         yield from _deviations(result)
     if certificate.notes.filled:
-        yield _bars(result.spec.effective.system.ordered(certificate.notes.filled))
+        own = result.spec.effective
+        yield _bars(own.system.ordered(certificate.notes.filled), causes(own))
 
 
 def _over_time(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Chart]:
@@ -129,7 +131,7 @@ def _planes(result: Result, x: Array, widths: Array) -> Iterator[Chart]:
         yield plane.chart(f"plane-{i}-{j}")
 
 
-def _bars(filled: Mapping[str, Shares]) -> Chart:
+def _bars(filled: Mapping[str, Shares], words: Mapping[str, str]) -> Chart:
     """A bar for each state in the long run and each input, of what fills it, as shares of the whole."""
     names, title = tuple(filled)[::-1], "What fills the tube and the inputs"  # the first one above
     rows = Axis(label="", low=-0.5, high=len(names) - 0.5, names=names)
@@ -138,7 +140,7 @@ def _bars(filled: Mapping[str, Shares]) -> Chart:
     chart = Chart(key="shares", title=title, x=share, y=rows, height=height, caption=caption)
     for row, name in enumerate(names):
         at = 0
-        for what, part in percents(filled[name]).items():
+        for what, part in percents(filled[name], words).items():
             low, high = (at, row - 0.3), (at + part, row + 0.3)
             chart.box(low, high, f"bar {_STYLES[what]}", what, f"{what} {part} %")
             at += part

@@ -21,6 +21,7 @@ from tubecert.sampled_loop.record import Certificate, Notes, Result
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import (
     assumed,
+    causes,
     extent,
     family,
     filling,
@@ -124,7 +125,9 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     if wishes:
         columns.append(["wish", *(near(wishes[name]) if name in wishes else "" for name in named)])
     if filled := notes.filled if notes else {}:
-        columns.append(["filled by", *(filling(filled[name]) if name in filled else "" for name in named)])
+        words = causes(result.spec.effective)
+        told = {name: filling(shares, words) for name, shares in filled.items()}
+        columns.append(["filled by", *(told.get(name, "") for name in named)])
     aside = len(names) > _ROWS and not notes
     head, *rows = columns if aside else zip(*columns, strict=True)
     left = len(system.states) - len(names)
@@ -157,7 +160,7 @@ def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     }
     if sizes:
         name = max(sizes, key=sizes.__getitem__)
-        yield f"fills {name}", filling(notes.long_run[name])
+        yield f"fills {name}", filling(notes.long_run[name], causes(result.spec.effective))
 
 
 def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
@@ -172,7 +175,7 @@ def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     """What fills that which lacks, and what would help."""
     for lack in result.lacks:
         if lack.where in notes.filled:
-            yield f"fills {lack.where}", filling(notes.filled[lack.where])
+            yield f"fills {lack.where}", filling(notes.filled[lack.where], causes(result.spec.effective))
         yield "help", remedy(lack, result.spec.effective, notes)
 
 

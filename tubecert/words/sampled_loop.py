@@ -24,6 +24,7 @@ SHARES: Final[Mapping[str, str]] = {
     "start": "start",
     "remainder": "remainder",
 }
+WITH_WIND: Final = "h and slow wind"
 _HELD: Final = {
     "middle": "in the middle of the interval in which it acts",
     "left": "where the interval begins in which it acts",
@@ -123,7 +124,7 @@ def remedy(lack: Lack, effective: Effective, notes: Notes) -> str:
     filled = notes.filled.get(lack.where)
     most = "" if filled is None else max(SHARES, key=lambda name: float(getattr(filled, name)))
     help = _HELP[lack.kind] if lack.where or lack.kind != "no_design" else _FASTER
-    return help.format(where=lack.where, largest=SHARES.get(most, "noise, wind, h or delay"))
+    return help.format(where=lack.where, largest=causes(effective).get(most, "noise, wind, h or delay"))
 
 
 def is_alone(effective: Effective) -> bool:
@@ -131,9 +132,15 @@ def is_alone(effective: Effective) -> bool:
     return effective.data.get("controller") == "none"
 
 
-def percents(shares: Shares) -> dict[str, int]:
-    """Whole per cents by the words of the shares, which add up to 100, or to 0; what is nothing is left out."""
-    parts = {SHARES[item.name]: float(getattr(shares, item.name)) for item in fields(shares)}
+def causes(effective: Effective) -> Mapping[str, str]:
+    """The words of the shares; wind of a bounded rate is compensated as h is, and counted with it."""
+    slow = "rate" in effective.part("disturbance")
+    return {**SHARES, "uncertainty": WITH_WIND} if slow else SHARES
+
+
+def percents(shares: Shares, words: Mapping[str, str]) -> dict[str, int]:
+    """Whole per cents by `words`, which add up to 100, or to 0; what is nothing is left out."""
+    parts = {words[item.name]: float(getattr(shares, item.name)) for item in fields(shares)}
     whole = sum(parts.values())
     if whole < NOTHING:
         return {}
@@ -144,9 +151,9 @@ def percents(shares: Shares) -> dict[str, int]:
     return {name: part for name, part in found.items() if part}
 
 
-def filling(shares: Shares) -> str:
+def filling(shares: Shares, words: Mapping[str, str]) -> str:
     """The same in a row, the largest first."""
-    found = percents(shares)
+    found = percents(shares, words)
     return ", ".join(f"{name} {found[name]} %" for name in sorted(found, key=lambda name: -found[name]))
 
 
@@ -170,7 +177,7 @@ def family(effective: Effective) -> str:
 
 def assumed(result: Result) -> Iterator[str]:
     """What the claim rests on and does not show."""
-    own, claim = result.spec.effective.part("hardware"), result.claim
+    own, claim = result.spec.effective, result.claim
     yield "every state is measured at every sample, with an error within the noise, arbitrary from sample to sample"
     yield "samples and inputs come exactly on time: the delay is the same for all, and nothing is lost"
     if claim.hold in _HELD:
@@ -181,14 +188,15 @@ def assumed(result: Result) -> Iterator[str]:
         yield "a planner that changes its plan does so for times later than delay and sample time together"
     else:
         yield "the actuators follow the plan's input continuously; the controller's own state is 0 at the start"
-    arithmetic = own.get("arithmetic", "double")
+    arithmetic = own.part("hardware").get("arithmetic", "double")
     yield f"the controller computes in {arithmetic} precision as IEEE 754 has it (C: compiled without -ffast-math)"
-    if any(len(each.ends) == 2 for each in result.spec.effective.system.parameters.values()):
+    if any(len(each.ends) == 2 for each in own.system.parameters.values()):
         yield "a parameter that has a range is constant, anywhere in its range"
-    if result.spec.effective.part("uncertainty").get("bounds"):
+    if own.part("uncertainty").get("bounds"):
         yield "the declared bounds of h and of its slopes hold"
-    if result.spec.effective.part("disturbance"):
-        yield "the wind is within its bound, and otherwise arbitrary"
+    if wind := own.part("disturbance"):
+        within = "wind and its rate are within their bounds" if "rate" in wind else "wind is within its bound"
+        yield f"the {within}, and otherwise arbitrary"
 
 
 def _delay(told: str) -> str:
