@@ -167,7 +167,7 @@ def test_degrees_are_shown_as_degrees():
 
 @pytest.mark.parametrize(("missed", "told"), [
     ("input: [2]", "it is no equilibrium: input: [2] is"),
-    ("", "it misses its own equations: tubecert check says where"),
+    ("", "it misses its own equations: tubecert check tells where by much"),
 ])  # fmt: skip
 def test_a_plan_that_misses_its_own_equations_is_told_on_the_first_screen(missed, told):
     certificate = sampled.certificate()

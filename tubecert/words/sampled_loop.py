@@ -84,7 +84,7 @@ def misses(fitting: str) -> str:
     return (
         f"it is no equilibrium: {fitting} is"
         if fitting
-        else "it misses its own equations: tubecert check says where"
+        else "it misses its own equations: tubecert check tells where by much"
     )
 
 
