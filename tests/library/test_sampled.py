@@ -123,8 +123,11 @@ def test_the_controller_is_the_recursion_of_the_record():
         assert np.allclose(controller(0.02 * k, np.array([0.5, 0.0]) + dy), wanted, atol=1e-12)
     with pytest.raises(ValueError, match=r"next sample is at t = 0.4"):
         controller(0.38, [0, 0])
+    with pytest.raises(ValueError, match="not finite"):
+        controller(0.4, [np.nan, 0])
+    assert np.isfinite(controller(0.4, [0, 0])).all(), "it was nan ever after"
     with pytest.raises(ValueError, match="family"):
-        controller(0.4, [0, 0], [0, 0], [0])
+        controller(0.42, [0, 0], [0, 0], [0])
 
 
 def test_along_a_plan_that_ends_and_of_a_family():

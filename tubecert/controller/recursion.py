@@ -48,7 +48,8 @@ class SampledController:
         """The input (m,) for the state (n,) that is measured at t, in s; it acts after the delay, for a sample time.
 
         Of a family the plan comes with every sample: x* at t (n,), and u* (m,) as it is held while the input acts.
-        Raises `ValueError` if t is not the time of the next sample, if y is no state, if a plan is missing, or is over.
+        Raises `ValueError` if t is not the time of the next sample, if y is no state, if a number is not
+        finite, if a plan is missing, or is over.
         """
         plan = self._plan
         if abs(t / self.sample_time - self.samples) > _ON_TIME * (1 + self.samples):
@@ -62,6 +63,8 @@ class SampledController:
         measured = np.asarray(y, float)
         if measured.shape != planned.shape:
             raise ValueError(f"y has {measured.size} numbers, the state has {planned.size}")
+        if not np.isfinite([*measured, *planned, *held]).all():  # all inputs from here on would be nan
+            raise ValueError("a number of the sample is not finite")
         self.samples += 1
         self._row = self._row + 1 if self._row + 1 < plan.steps else plan.after
         return self._step(measured[:, None], planned[:, None], held[:, None])[:, 0]
