@@ -212,6 +212,8 @@ def test_the_page_is_one_page_with_figures_and_the_same_words():
 def test_the_page_has_the_equations_of_the_loop_and_how_to_check_it():
     text = markdown.render_page(page_of(sampled.certificate()))
     for told in (
+        "- wind: bound = 0.05",
+        "- limits: F = ",
         "v' = -v + (F + h) + w",
         "u = u* + M z_k + N (y_k - x*(t_k)),   held for a sample time from t_k + delay on",
         "recheck CERT.json --spec SPEC.yaml",

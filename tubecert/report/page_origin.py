@@ -63,7 +63,9 @@ def _facts(effective: Effective, overrides: Mapping[str, object]) -> Iterator[tu
         yield "bounds declared", _list(bounds)
     told, any_of = effective.part("trajectory"), effective.trajectory.kind == "any"
     yield "plan", f"any with {family(effective)}" if any_of else _plan(told)
-    for name in ("initial_state", "adaptation", "hardware"):
+    if wind := effective.part("disturbance"):
+        yield "wind", _list({name: value for name, value in wind.items() if name != "E"})
+    for name in ("initial_state", "adaptation", "hardware", "limits"):
         if part := effective.part(name):
             yield name.replace("_", " "), _list(part)
     for obstacle in effective.parts("obstacles"):
