@@ -108,6 +108,10 @@ def test_explain_knows_every_label(name):
     assert not [word for word in {*labels, *causes, "wish", "room"} if explained.find(word) is None]
 
 
+def test_where_parameters_are_not_known_that_is_a_remedy():
+    assert "parameters that are known better" in remedy(LACKS["no tube"], OF_CART, Notes())
+
+
 @given(st.builds(Shares, **dict.fromkeys(asdict(sampled.WIDE), st.floats(0, 1e6))))
 def test_shares_add_up(shares):
     found = percents(shares, SHARES)

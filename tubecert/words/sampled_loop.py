@@ -55,7 +55,8 @@ _FASTER: Final = "a higher hardware.rate, a shorter hardware.delay, less noise, 
 _AUTO: Final = "controller: auto; without one every mode must die away by itself"
 _HELP: Final[Mapping[Missing, str]] = {
     "no_design": "an input or a sensor for that mode of {where}",
-    "no_fixed_point": "a nearer start, less noise, wind or h, a higher hardware.rate, or a plan that moves less",
+    "no_fixed_point": "a nearer start, less noise, wind or h, parameters that are known better, a higher "
+    "hardware.rate, or a plan that moves less",
     "inputs": "wider limits, a plan that uses less of them, or less of what asks most: {largest}",
     "safe_set": "a larger safe_set, a plan farther from its sides, or less of what fills the tube",
     "start": "a nearer initial_state, or a larger wish or safe_set",
