@@ -12,9 +12,10 @@ from texts import CONFIGS
 
 from tubecert import pipeline
 from tubecert.certificate.result import Result
+from tubecert.simulation.adaptive.continuous import DIVERGED
 from tubecert.simulation.adaptive.engine import integrate
 from tubecert.simulation.adaptive.lanes import Found
-from tubecert.simulation.adaptive.loops import Batch, Disturbance, Failure, LoopProblem, Runs
+from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopProblem, Runs
 from tubecert.simulation.adaptive.reading import adopted
 from tubecert.simulation.adaptive.setting import Setting, setting_of
 from tubecert.spec import Spec, load, load_text
@@ -56,10 +57,13 @@ def runs(
     peaks: Any = None,
     least: Any = 0.0,
     greatest: Any = 0.0,
-    failures: tuple[Failure, ...] = (),
+    ended: dict[int, float] | None = None,
     **changes: Any,
 ) -> Runs:
-    """Runs by hand around a plan at 0: x (N, K, n), distance (N, K); other `peaks` (N,) with their times by name."""
+    """Runs by hand around a plan at 0: x (N, K, n), distance (N, K); other `peaks` (N,) with their times by name.
+
+    `ended`: which lanes diverged, and when; `changes` of what else was found.
+    """
     N, K, n = x.shape
     zero = np.zeros((N, K, m))
     sizes = {"distance": distance, "deviation": np.linalg.norm(x, axis=2)}
@@ -68,26 +72,18 @@ def runs(
     met |= {name: (np.array(value), np.array(time)) for name, (value, time) in (peaks or {}).items()}
     seen = {"x": x, "off": x, "slope": np.gradient(x, t, axis=1), "xtilde": 0 * x, "distance": distance}
     seen |= dict.fromkeys(("u", "k", "u_a", "sigma_hat", "h"), zero)
-    stopped, ended = np.zeros(N, dtype=int), np.full(N, np.nan)
-    for item in failures:
-        stopped[item.lane], ended[item.lane] = 1, item.t
+    over = {lane: (DIVERGED, t) for lane, t in (ended or {}).items()}
+    why, when = zip(*(over.get(lane, (0, np.nan)) for lane in range(N)), strict=True)
     found = Found(
         seen={name: np.moveaxis(part, 0, -1).copy() for name, part in seen.items()},
         peak={name: value for name, (value, _) in met.items()},
         peak_time={name: time for name, (_, time) in met.items()},
         least=np.zeros((m, N)) + least,
         greatest=np.zeros((m, N)) + greatest,
-        stopped=stopped,
-        ended=ended,
+        stopped=np.array(why),
+        ended=np.array(when),
+        error=np.zeros(N),
+        unresolved=np.full(N, np.nan),
+        steps=np.ones(N, dtype=int),
     )
-    values: dict[str, Any] = {
-        "t": t,
-        "x_plan": np.zeros((K, n)),
-        "u_plan": np.zeros((K, m)),
-        "found": found,
-        "error": np.zeros(N),
-        "unresolved": np.full(N, np.nan),
-        "failures": failures,
-        "steps": np.ones(N, dtype=int),
-    }
-    return Runs(**(values | changes))
+    return Runs(t=t, x_plan=np.zeros((K, n)), u_plan=np.zeros((K, m)), found=found._replace(**changes))

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from simulated import FLAT, Failure, certified, runs, setting
+from simulated import FLAT, certified, runs, setting
 
 from tubecert.certificate.result import Bound, Recipes
 from tubecert.conditions.inputs import InputBound
@@ -159,7 +159,7 @@ def test_inputs_stay_in_their_ranges(least, expected):
 @pytest.mark.parametrize(("share", "outside"), [(1.004, ()), (1.007, (0, 1))])
 def test_a_bound_is_broken_only_beyond_the_error_of_the_run(share, outside):
     where = setting("flat")
-    given = replace(quiet_runs(share), error=np.full(2, 0.005 * where.rho))
+    given = quiet_runs(share, error=np.full(2, 0.005 * where.rho))
     found = compare(where, given, promised(half_widths={"p": 1.0, "v": where.rho}, decay=None))
     assert found.first_outside == outside
     assert broken(found) == ({"tube", "deviation", "half-width of v"} if outside else set())
@@ -167,7 +167,7 @@ def test_a_bound_is_broken_only_beyond_the_error_of_the_run(share, outside):
 
 def test_a_large_error_is_no_result():
     where = setting("flat")
-    doubtful = replace(quiet_runs(3.0), error=np.array([0.0, 0.011 * where.rho]))
+    doubtful = quiet_runs(3.0, error=np.array([0.0, 0.011 * where.rho]))
     found = compare(where, doubtful, promised())
     assert (found.no_result, [item.run for item in found.unresolved]) == (1, [1])
     assert found.first_outside == (0,)
@@ -176,8 +176,8 @@ def test_a_large_error_is_no_result():
 
 @pytest.mark.parametrize(("share", "left"), [(1.9, False), (2.1, True), (30.0, True)])
 def test_a_run_that_is_stopped_has_left_the_tube_beyond_two_radii(share, left):
-    where, failures = setting("flat"), (Failure(lane=1, t=2.5, reason="the state diverges"),)
-    stopped = quiet_runs(share, error=np.array([0.0, np.inf]), failures=failures)
+    where = setting("flat")
+    stopped = quiet_runs(share, error=np.array([0.0, np.inf]), ended={1: 2.5})
     found = compare(where, stopped, promised())
     assert (1 in found.first_outside) is left
     assert found.no_result == (not left)
@@ -187,16 +187,17 @@ def test_a_run_that_is_stopped_has_left_the_tube_beyond_two_radii(share, left):
 
 
 def test_runs_along_several_plans_are_numbered_through_and_judged_as_one():
-    where, failures = setting("flat"), (Failure(lane=1, t=2.5, reason="the state diverges"),)
+    where = setting("flat")
     own = promised(ultimate=0.25 * where.rho, decay=None)
     outside = quiet_runs(1.5)
     outside.off[1, 0, 1] = 1.2 * where.rho  # the second is outside from the start
-    stopped = quiet_runs(0.7, error=np.array([0.0, np.inf]), failures=failures)
+    stopped = quiet_runs(0.7, error=np.array([0.0, np.inf]), ended={1: 2.5})
     found = compare(where, joined([quiet_runs(), outside, stopped]), own)
     assert (found.runs, found.left_the_tube, found.no_result) == (6, 2, 1)
     assert found.first_outside == (2, 3)
     assert found.first_exit == RunAt(run=3, t=0.0)
     assert [(item.run, item.t) for item in found.stopped] == [(5, 2.5)]
+    assert found.stopped[0].reason.startswith("the state diverges")
     assert found.worst["deviation"] == replace(compare(where, outside, own).worst["deviation"], run=2)
     assert found.settled == compare(where, outside, own).settled > compare(where, quiet_runs(), own).settled
 

@@ -116,7 +116,7 @@ def test_loops_agree_with_dop853(controller):
     z0 = np.concatenate([START[0], np.zeros(SIZES[controller])])
     expected = dop853(right_hand_side(controller, gains), z0, case.times)
     found = alone(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-5)
-    assert not found.failures
+    assert not found.found.stopped.any()
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     if controller == "l1":
         assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-5
@@ -264,7 +264,7 @@ def test_state_dependent_inputs_agree_with_dop853(controller):
     z0 = np.concatenate([start[0], np.zeros(SIZES[controller])])
     expected = dop853(slanted_rate(controller, gains), z0, case.times)
     found = alone(case, start, Disturbance.from_expressions(SLANTED.h, SLANTED, 1), tolerance=1e-5)
-    assert not found.failures
+    assert not found.found.stopped.any()
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     assert found.distance[0, 0] == pytest.approx(
         np.sqrt(np.array([0.2, flat(-0.25)]) @ np.linalg.solve([[1, -0.5], [-0.5, 1]], [0.2, flat(-0.25)])),
@@ -290,7 +290,7 @@ def test_lanes_do_not_know_each_other():
     gains = LoopGains(bandwidth=20.0, projection_radius=3.0, predictor_gain=2.0, adaptation_rate=1e4)
     case = problem("l1", model=UNSTABLE, gains=gains, horizon=1.0)
     vector = alone(case, starts, d, tolerance=1e-5)
-    assert [item.lane for item in vector.failures] == [7]
+    assert np.flatnonzero(vector.found.stopped).tolist() == [7]
     assert vector.error[7] == np.inf
     assert np.isnan(vector.x[7, -1]).all()
     assert np.nanmax(np.abs(vector.h)) <= 1.5 * (1 + 1e-12)
@@ -397,6 +397,6 @@ def test_an_f_that_depends_on_time_agrees_with_dop853():
     case = problem("l1", horizon=1.0, model=model, gains=gains)
     expected = dop853(rate, np.concatenate([START[0], np.zeros(4)]), case.times)
     found = alone(case, START, Disturbance.from_expressions(wavy_h(), model, 1), tolerance=1e-5)
-    assert not found.failures
+    assert not found.found.stopped.any()
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
     assert np.abs(found.xtilde[0] - expected[:, 2:4]).max() < 1e-5

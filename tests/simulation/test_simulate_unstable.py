@@ -14,6 +14,7 @@ from tubecert.report.simulation import page_of
 from tubecert.report.terminal import Terminal
 from tubecert.report.text import screen
 from tubecert.simulation.adaptive.campaign import SPECIFIED, Campaign, Followed, simulate
+from tubecert.simulation.adaptive.continuous import DIVERGED, reason
 from tubecert.simulation.adaptive.judge import compare
 from tubecert.simulation.adaptive.loops import Disturbance, LoopProblem
 from tubecert.simulation.adaptive.setting import Choice, loop_of
@@ -47,20 +48,19 @@ def test_a_state_beyond_the_limit_is_not_followed():
     near, far = (run(loop(limit=limit)) for limit in (200.0, 20_000.0))
     ends = []
     for found, limit in ((near, 200), (far, 20_000)):
-        (failure,) = found.failures
-        assert f"|x - x*| exceeds {limit}" in failure.reason
+        (why,), (end,) = found.found.stopped, found.found.ended
+        assert f"|x - x*| exceeds {limit}" in reason(why, limit)
         assert limit / 3 < found.found.peak["deviation"][0] <= limit
-        assert np.isnan(found.x[0, found.t > failure.t + 0.1]).all()
-        ends.append(failure.t)
+        assert np.isnan(found.x[0, found.t > end + 0.1]).all()
+        ends.append(end)
     assert ends[0] < ends[1] < 6
     assert np.log(20_000 / 200) / 3 == pytest.approx(ends[1] - ends[0], rel=0.15)
 
 
 @pytest.mark.slow
 def test_a_state_that_is_no_number_is_not_followed():
-    (failure,) = run(loop(), start=(np.nan, 0.0)).failures
-    assert failure.t == 0
-    assert failure.reason.startswith("the state diverges from the plan")
+    found = run(loop(), start=(np.nan, 0.0)).found
+    assert (found.stopped, found.ended) == (DIVERGED, 0)
 
 
 def thinner(where, factor):

@@ -79,7 +79,7 @@ def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress
     Its runs take a third of the steps of those that are `known`: what they find is a proposal.
     """
     rng = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(2**31,)))
-    kind, count = setting.uncertainty, ceil(np.median(known.steps) / _COARSER)
+    kind, count = setting.uncertainty, ceil(np.median(known.found.steps) / _COARSER)
     size = kind.adversary + kind.beside + (len(setting.x0) if setting.varied else 0)
     genes = rng.random((_POPULATION, size))
     kept, scores = np.zeros((0, size)), np.zeros(0)

@@ -7,15 +7,15 @@ lost in one step.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
-from tubecert.simulation.adaptive.continuous import Continuous, reason
+from tubecert.simulation.adaptive.continuous import Continuous
 from tubecert.simulation.adaptive.lanes import Found, combined, follow, of_some
-from tubecert.simulation.adaptive.loops import Batch, Failure, Runs
+from tubecert.simulation.adaptive.loops import Batch, Runs
 from tubecert.simulation.adaptive.times import START, steps
 
 Places = NDArray[np.intp]
@@ -30,44 +30,19 @@ _BEFORE: Final = 1 / 8  # ... and times the change before
 _ESTIMATE: Final = 0.02  # of R_H, 1 % of what bounds |sigma_hat - h|: what sigma_hat and that peak may change
 
 
-class _Resolved(NamedTuple):
-    """What N lanes found in their last steps; as in `Runs`."""
-
-    found: Found
-    error: Array
-    unresolved: Array
-    steps: NDArray[np.int64]
-
-
 def integrate(batches: Sequence[Batch], *, tolerance: float, count: int | None = None) -> tuple[Runs, ...]:
     """The runs of every batch, all as lanes of one vector, to an error of about `tolerance` in |S x|, P = S'S.
 
-    Batches are of the same model and times. A lane that diverges or has no geodesic is stopped and listed in
-    `failures`, and the others go on. With a `count` of steps runs are proposals whose error is not known (inf),
-    seen at their ends alone.
+    Batches are of the same model and times. A lane that diverges or has no geodesic is stopped, and the others go on.
+    With a `count` of steps runs are proposals whose error is not known (inf), seen at their ends alone.
     """
     lanes = _Lanes(batches, count)
-    best = _resolved(lanes, tolerance) if count is None else _proposed(lanes)
+    best = _resolved(lanes, tolerance) if count is None else follow(lanes.system(np.arange(lanes.N), 0))
     runs = list[Runs]()
     for batch, a, b in lanes.parts():
-        problem, found = batch.problem, of_some(best.found, slice(a, b))
-        plan = next(i for i, each in enumerate(lanes.plans) if each is problem.plan)
-        at = lanes.grid.outputs, START, slice(None), plan
-        runs.append(
-            Runs(
-                t=lanes.times,
-                x_plan=lanes.grid.plan.x[at],
-                u_plan=lanes.grid.plan.u[at],
-                found=found,
-                error=best.error[a:b],
-                unresolved=best.unresolved[a:b],
-                steps=best.steps[a:b],
-                failures=tuple(
-                    Failure(lane, float(found.ended[lane]), reason(int(found.stopped[lane]), problem.limit))
-                    for lane in np.flatnonzero(found.stopped).tolist()
-                ),
-            )
-        )
+        plan = next(i for i, each in enumerate(lanes.plans) if each is batch.problem.plan)
+        x, u = (each[lanes.grid.outputs, START, :, plan] for each in (lanes.grid.plan.x, lanes.grid.plan.u))
+        runs.append(Runs(t=lanes.times, x_plan=x, u_plan=u, found=of_some(best, slice(a, b))))
     return tuple(runs)
 
 
@@ -105,36 +80,29 @@ class _Lanes:
         return np.sqrt(np.maximum(square, 0.0)), np.maximum(moved, peaks) / self._room[lanes]
 
 
-def _proposed(vector: _Lanes) -> _Resolved:
-    """All lanes in the longest steps; their error is not known: inf."""
-    system = vector.system(np.arange(vector.N), 0)
-    error, never = np.full(vector.N, np.inf), np.full(vector.N, np.nan)
-    return _Resolved(follow(system), error, never, np.full(vector.N, len(system.grid.start) - 1))
-
-
-def _resolved(vector: _Lanes, tolerance: float) -> _Resolved:
+def _resolved(vector: _Lanes, tolerance: float) -> Found:
     """All lanes, level after level of those that are not done.
 
     What is told of a lane's error is at most five tolerances, or it cannot be integrated so far. It is given up as soon
     as halving its steps no longer helps, which is so where the loop itself amplifies every difference.
     """
-    best, lanes = _proposed(vector), np.arange(vector.N)
+    lanes = np.arange(vector.N)
+    best = follow(vector.system(lanes, 0))
     changes = np.full((_LEVELS, vector.N), np.inf)
     failed = np.zeros((_LEVELS, vector.N), dtype=bool)
-    failed[0] = best.found.stopped > 0
+    failed[0] = best.stopped > 0
     for level in range(1, _LEVELS):
         system, whole = vector.system(lanes, level), len(lanes) == vector.N
-        coarser, finer = best.found if whole else of_some(best.found, lanes), follow(system)
-        best = best._replace(found=finer if whole else combined([best.found, finer], _put(lanes)))
-        best.steps[lanes] = len(system.grid.start) - 1
+        coarser, finer = best if whole else of_some(best, lanes), follow(system)
         apart, beside = vector.apart(lanes, finer, coarser)
         change = np.nan_to_num(apart.max(axis=0), nan=np.inf)
         failed[level, lanes], changes[level, lanes] = finer.stopped > 0, change
         told = np.maximum(_LUCK * change, changes[level - 1, lanes] * _BEFORE if level > 1 else 0.0)
-        best.error[lanes] = np.where(failed[level, lanes], np.inf, told)
+        finer.error[:] = np.where(failed[level, lanes], np.inf, told)
         beyond = ~(apart <= tolerance)
         first = vector.times[np.argmax(beyond, axis=0)]
-        best.unresolved[lanes] = np.where(beyond.any(axis=0), first, np.nan)
+        finer.unresolved[:] = np.where(beyond.any(axis=0), first, np.nan)
+        best = finer if whole else combined([best, finer], _put(lanes))
         agree = np.abs(finer.ended - coarser.ended) <= _AGREEING * vector.times[-1]
         agree &= failed[level - 1, lanes] & (np.searchsorted(system.grid.start, finer.ended) >= _LIVED)
         near = (told <= _ENOUGH * tolerance) & (beside <= 1)

@@ -21,6 +21,7 @@ from tubecert.errors import TubecertError
 from tubecert.expression import Expression, derivatives
 from tubecert.findings import Finding
 from tubecert.model import TIME
+from tubecert.simulation.adaptive.continuous import reason
 from tubecert.simulation.adaptive.loops import Runs
 from tubecert.simulation.adaptive.reading import Promise
 from tubecert.simulation.adaptive.setting import Setting
@@ -132,21 +133,23 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
     room = _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
     left = usable & (peak["deviation"] > setting.rho * (1 + room))
     left |= usable & (peak["distance"] > setting.reach * (1 + room))
-    left |= (runs.found.stopped != 0) & (peak["deviation"] > 2 * setting.rho)
+    why, ended = runs.found.stopped, runs.found.ended
+    left |= (why != 0) & (peak["deviation"] > 2 * setting.rho)
     deviation = np.linalg.norm(runs.off @ setting.S.T, axis=2)
     own = _Judged(setting, runs, usable, left, room, deviation)
     bounds = promise.bounds if promise else {"distance": setting.reach, "deviation": setting.rho}
     outside, void, any_usable = np.flatnonzero(left), ~usable & ~left, bool(usable.any())
-    unknown = np.flatnonzero(void & (runs.found.stopped == 0))[:_LISTED].tolist()
+    unknown = np.flatnonzero(void & (why == 0))[:_LISTED].tolist()
     return Comparison(
-        runs=runs.lanes,
+        runs=len(left),
         left_the_tube=len(outside),
         first_outside=tuple(outside[:_LISTED].tolist()),
         first_exit=_first_exit(own),
         no_result=int(void.sum()),
-        unresolved=tuple(RunAt(run=lane, t=_finite(runs.unresolved[lane])) for lane in unknown),
+        unresolved=tuple(RunAt(run=lane, t=_finite(runs.found.unresolved[lane])) for lane in unknown),
         stopped=tuple(
-            Stopped(run=item.lane, t=_finite(item.t), reason=item.reason) for item in runs.failures[:_LISTED]
+            Stopped(run=lane, t=_finite(ended[lane]), reason=reason(int(why[lane]), setting.limit))
+            for lane in np.flatnonzero(why)[:_LISTED].tolist()
         ),
         worst={name: _use(own, name, bounds.get(name)) for name in _SHOWN} if any_usable else {},
         violations=tuple(_violations(own, promise)) if promise else (),
@@ -200,7 +203,7 @@ def _inputs(own: _Judged, promise: Promise | None) -> Iterator[InputUse]:
 def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
     """Every bound that is broken, by the run that breaks it most."""
     runs, found, spec = own.runs, own.runs.found, own.setting.spec
-    never = np.full(runs.lanes, np.nan)  # when an input was at its end is not known
+    never = np.full(len(own.left), np.nan)  # when an input was at its end is not known
     for name, bound in promise.bounds.items():
         words, when = "tube" if name == "distance" else name, found.peak_time[name]
         yield from _broken(own, words, found.peak[name], bound, bound, when)
@@ -215,12 +218,9 @@ def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
             yield from _broken(own, f"input {sign}{name}", values[column], bound, size, never)
     if promise.decay is not None:
         yield from _over_time(own, "D(t)", runs.distance, promise.decay(runs.t), own.setting.reach)
-    for item in runs.failures:
-        if own.left[item.lane]:
-            value = _finite(found.peak["deviation"][item.lane])
-            yield Violation(
-                bound_of="tube", run=item.lane, t=_finite(item.t), value=value, bound=own.setting.rho
-            )
+    for lane in np.flatnonzero((found.stopped != 0) & own.left).tolist():
+        t, value = _finite(found.ended[lane]), _finite(found.peak["deviation"][lane])
+        yield Violation(bound_of="tube", run=lane, t=t, value=value, bound=own.setting.rho)
 
 
 def _over_time(own: _Judged, name: str, values: Array, allowed: Array, scale: float) -> Iterator[Violation]:

@@ -25,8 +25,11 @@ class Found(NamedTuple):
     """What N lanes leave behind.
 
     `seen` (K, .., N) at the output times, nan where they did not come; `peak` (-inf where there is none), `peak_time`
-    (N,) by name; `least` and `greatest` (m, N) of the inputs; why (0: it was not) and when a lane was `stopped`,
-    `ended` (N,).
+    (N,) by name; `least` and `greatest` (m, N) of the inputs; why (0: it was not) and when in s a lane was `stopped`,
+    `ended` (N,). `error` (N,) is twice the largest difference of states to the run with steps twice as long, or an
+    eighth of the difference before: mostly far above the true one; inf where it is not known, or the lane failed.
+    `unresolved` (N,) is the first output time at which that difference exceeds the tolerance, nan where it never does;
+    `steps` (N,) how many there were.
     """
 
     seen: dict[str, Array]
@@ -36,6 +39,9 @@ class Found(NamedTuple):
     greatest: Array
     stopped: NDArray[np.int64]
     ended: Array
+    error: Array
+    unresolved: Array
+    steps: NDArray[np.int64]
 
 
 def combined(parts: Sequence[Found], how: Callable[..., Array]) -> Found:
@@ -132,6 +138,9 @@ class _Record:
             greatest=np.full(inputs, -np.inf),
             stopped=self._system.stopped,
             ended=self._ended,
+            error=np.full(N, np.inf),
+            unresolved=np.full(N, np.nan),
+            steps=np.full(N, len(self._start) - 1),
         )
 
     def closed(self) -> Found:

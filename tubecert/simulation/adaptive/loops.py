@@ -138,14 +138,6 @@ class Batch:
         return replace(self, x0=self.x0[lanes], disturbance=self.disturbance.of(lanes))
 
 
-class Failure(NamedTuple):
-    """A lane that was stopped: when, in s, and why."""
-
-    lane: int
-    t: float
-    reason: str
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Runs:
     """N runs at K output times.
@@ -153,20 +145,13 @@ class Runs:
     `t` (K,), `x_plan` (K, n), `u_plan` (K, m). What was seen is an attribute, too, with the lanes first: x, x - x* =
     `off`, x' = `slope` and `xtilde` (N, K, n), `k`, `u_a`, `sigma_hat`, `h` and u = u* + k + u_a (N, K, m), `distance`
     (N, K), the Riemannian d(x*, x). A quantity that a loop does not have is 0. Peaks over all steps are in `found`, as
-    are the ends of inputs. After a lane was stopped its values are nan. `error` (N,) is twice the largest difference of
-    states to the run with steps twice as long, or an eighth of the difference before: mostly far above the true one;
-    inf for a lane that failed. `unresolved` (N,) is the first output time at which that difference exceeds the
-    tolerance, nan where it never does; `steps` (N,) how many the last ones were.
+    are the ends of inputs and the errors. After a lane was stopped its values are nan.
     """
 
     t: Array
     x_plan: Array
     u_plan: Array
     found: Found
-    error: Array
-    unresolved: Array
-    steps: NDArray[np.int64]
-    failures: tuple[Failure, ...]
 
     def __getattr__(self, name: str) -> Array:
         if name == "found" or name not in self.found.seen:
@@ -174,9 +159,9 @@ class Runs:
         return np.moveaxis(self.found.seen[name], -1, 0)
 
     @property
-    def lanes(self) -> int:
-        """N."""
-        return len(self.error)
+    def error(self) -> Array:
+        """Of the integration, in |S x|, (N,)."""
+        return self.found.error
 
     def with_only(self, names: Sequence[str]) -> Runs:
         """The same without what else was seen: many of them fit into memory."""
@@ -186,20 +171,5 @@ class Runs:
 
 def joined(parts: Sequence[Runs]) -> Runs:
     """Runs at the same times, one after the other; lanes are numbered through."""
-    starts = np.cumsum([0, *(part.lanes for part in parts)]).tolist()
-
-    def last(*arrays: Array) -> Array:
-        return np.concatenate(arrays, axis=-1)
-
-    return replace(
-        parts[0],
-        found=combined([part.found for part in parts], last),
-        failures=tuple(
-            item._replace(lane=start + item.lane)
-            for start, part in zip(starts, parts, strict=False)
-            for item in part.failures
-        ),
-        error=last(*(part.error for part in parts)),
-        unresolved=last(*(part.unresolved for part in parts)),
-        steps=np.concatenate([part.steps for part in parts]),
-    )
+    found = combined([part.found for part in parts], lambda *each: np.concatenate(each, axis=-1))
+    return replace(parts[0], found=found)

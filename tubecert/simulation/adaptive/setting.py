@@ -86,6 +86,11 @@ class Setting(Certified):
         return self.rho * float(np.linalg.norm(np.linalg.inv(self.S), 2))
 
     @property
+    def limit(self) -> float:
+        """Where |x - x*| is more than this a run is not followed any more."""
+        return _LIMIT * self.greatest_radius
+
+    @property
     def tolerance(self) -> float:
         """The error of |S x| that the integrator is asked for."""
         return _TOLERANCE * self.rho
@@ -211,7 +216,7 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
         horizon=setting.horizon,
         times=setting.times,
         gains=gains,
-        limit=_LIMIT * setting.greatest_radius,
+        limit=setting.limit,
         degree=_EVEN_DEGREE if _even(setting) else _DEGREE,
         P=setting.S.T @ setting.S,
         E=setting.E,
