@@ -146,6 +146,12 @@ def test_without_a_controller_one_is_advised():
     assert "a larger safe_set" in text
 
 
+def test_what_helps_against_two_lacks_is_told_once():
+    lacks = tuple(Lack(kind="plan", where=name, needed=9.0, allowed=8.0) for name in ("left", "right"))
+    text = shown(sampled.certificate(sampled.DRONE, verdict=Verdict.UNDECIDED, lacks=lacks))
+    assert text.count("wider limits") == 1
+
+
 def test_where_nothing_acts_it_is_said_in_one_way():
     least = Fraction("1e-30")
     stage = Stage(start=0, half_widths={"p": Fraction("0.1"), "v": least}, deviations={"F": least}, memory=())

@@ -173,10 +173,11 @@ def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
 
 def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     """What fills that which lacks, and what would help."""
+    own = result.spec.effective
     for lack in result.lacks:
         if lack.where in notes.filled:
-            yield f"fills {lack.where}", filling(notes.filled[lack.where], causes(result.spec.effective))
-        yield "help", remedy(lack, result.spec.effective, notes)
+            yield f"fills {lack.where}", filling(notes.filled[lack.where], causes(own))
+    yield from (("help", help) for help in dict.fromkeys(remedy(lack, own, notes) for lack in result.lacks))
 
 
 def _law(own: Effective) -> Iterator[Listing]:
