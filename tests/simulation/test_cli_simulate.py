@@ -226,7 +226,10 @@ def test_a_folder_that_stays_empty_does_not_stay(files):
 def test_a_loop_that_cannot_be_resolved_is_no_result(monkeypatch):
     def coarse(batches, **options):
         error = np.full(1, 0.02 * setting("flat").rho)
-        return [replace(found, error=error) for found in engine.integrate(batches, **options)]
+        return [
+            replace(each, found=each.found._replace(error=error))
+            for each in engine.integrate(batches, **options)
+        ]
 
     monkeypatch.setattr(campaigns, "integrate", coarse)
     result = command("--runs", "0")
