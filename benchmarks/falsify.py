@@ -71,7 +71,7 @@ def _share(found: object) -> str:
 
 def _notes(attack: Attack) -> str:
     """Broken promises and runs without a result, if there are any."""
-    broken = [item.bound_of for item in attack.random.comparison.violations]
+    broken = [item.of for item in attack.random.comparison.violations]
     lost = attack.random.comparison.no_result
     return (f"  BROKEN: {', '.join(broken)}" if broken else "") + (f"  no result: {lost}" if lost else "")
 

@@ -109,7 +109,7 @@ def test_a_broken_promise_is_loud_and_can_be_replayed(files):
     number = re.search(r"--replay (\d+)", result.stdout)
     assert number is not None
     sample = json.loads((files / "flat.simulation" / "summary.json").read_text())["attacks"][0]["random"]
-    named = {item["run"]: item["value"] for item in sample["violations"] if item["bound_of"] == "tube"}
+    named = {item["run"]: item["value"] for item in sample["violations"] if item["of"] == "tube"}
     again = run(
         "simulate", "flat.yaml", "--certificate", "forged.json", "--runs", "0", "--controllers", "l1",
         "--replay", next(iter(named)), "--json",

@@ -106,13 +106,13 @@ def test_a_lie_is_found_with_seed_run_and_time(how):
     found = simulate(own, "hash", runs=20, seed=4)
     assert (found.outcome, found.summary["seed"]) == ("falsified", 4)
     first = found.violations[0]
-    run, attack = first.peak.run, Attack(own, seed=4)
+    run, attack = first.run, Attack(own, seed=4)
     again, of = (
         resolved(attack, partial(linear, own.tables), range(run, run + 1)),
         own.names.index(first.of),
     )
-    assert own.t[again.node[of, 0]] == first.peak.t
-    assert again.most[of, 0] == pytest.approx(first.peak.share, rel=1e-9)
+    assert own.t[again.node[of, 0]] == first.t
+    assert again.most[of, 0] == pytest.approx(first.share, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -139,7 +139,7 @@ def test_inputs_and_obstacles_are_judged_as_well():
     use = own.result.inputs[0]
     near = setting("cart", inputs=(replace(use, range=(Fraction(-1, 10), use.range[1])),))
     assert simulate(near, "h", runs=0, seed=0).outcome == "falsified"
-    assert simulate(own, "h", runs=0, seed=0).passed[0].distance > 1
+    assert simulate(own, "h", runs=0, seed=0).obstacles[0].clearance > 1
     touched = setting("cart", ("center: [2, 0]", "center: [0.5, 0]"))
     assert proven("cart").clearance[0].verdict.value == "certified"
     assert simulate(touched, "h", runs=0, seed=0).outcome == "falsified"

@@ -12,10 +12,11 @@ from tubecert.certificate.result import Bound, Recipes
 from tubecert.conditions.inputs import InputBound
 from tubecert.errors import TubecertError
 from tubecert.letters import DISTANCE, RATES
-from tubecert.simulation.adaptive.judge import RunAt, check_class, compare
+from tubecert.simulation.adaptive.judge import check_class, compare
 from tubecert.simulation.adaptive.loops import joined
 from tubecert.simulation.adaptive.reading import Certified, Decay, promise
 from tubecert.simulation.adaptive.uncertainty import class_of
+from tubecert.simulation.told import RunAt
 from tubecert.spec import Output, load_text
 from tubecert.verdict import Verdict
 
@@ -39,7 +40,7 @@ def promised(**changes):
 
 
 def broken(found):
-    return {item.bound_of for item in found.violations}
+    return {item.of for item in found.violations}
 
 
 @pytest.mark.parametrize(("bandwidth", "off"), [(7.0, 1e-8), (1.3, 1e-4)])
@@ -153,7 +154,7 @@ def test_inputs_stay_in_their_ranges(least, expected):
     own = promised(ranges={"u": stays}, decay=None)
     compared = compare(setting("flat"), quiet_runs(lanes=1, least=[[least]], greatest=[[1.0]]), own)
     assert broken(compared) == expected
-    assert (compared.inputs[0].least, compared.inputs[0].proven) == (least, (-1.0, 2.0))
+    assert (compared.went["u"].least, compared.went["u"].proven) == (least, (-1.0, 2.0))
 
 
 @pytest.mark.parametrize(("share", "outside"), [(1.004, ()), (1.007, (0, 1))])
@@ -182,7 +183,7 @@ def test_a_run_that_is_stopped_has_left_the_tube_beyond_two_radii(share, left):
     assert (1 in found.first_outside) is left
     assert found.no_result == (not left)
     assert not found.unresolved
-    told = [(item.bound_of, item.run, item.t) for item in found.violations]
+    told = [(item.of, item.run, item.t) for item in found.violations]
     assert (("tube", 1, 2.5) in told) is left
 
 

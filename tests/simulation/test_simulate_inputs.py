@@ -48,15 +48,15 @@ def test_random_runs_and_an_adversary_stay_within_what_is_proven(limited, letter
     found = simulate(setting, [loop], count=20, seed=3)
     (own,) = result.inputs
     for comparison in of_all(found):
-        (use,) = comparison.inputs
+        (use,) = comparison.went.values()
         assert use.proven[0] <= use.least <= use.greatest <= use.proven[1]
         assert (
             own.plan.least.above == own.plan.greatest.above == 0
         )  # the plan is at rest: u is all of the loop's
         assert use.greatest - use.least > 0.05  # and it does something
     told = found.summary("sha256:0")
-    assert {part["inputs"][0]["input"] for part in told["loops"]} == {"u"}
-    assert told["attacks"][0]["random"]["inputs"][0]["proven"] == list(use.proven)
+    assert {name for part in told["loops"] for name in part["went"]} == {"u"}
+    assert told["attacks"][0]["random"]["went"]["u"]["proven"] == list(use.proven)
 
 
 @pytest.mark.slow
@@ -67,12 +67,12 @@ def test_a_bound_that_is_too_small_is_broken_by_a_run(limited, end):
     runs = simulate(setting, [loop], count=0, seed=0).loops[0].runs
     fair = compare(setting, runs, loop.promise)
     assert not fair.violations
-    (use,) = fair.inputs
+    use = fair.went["u"]
     met = getattr(use, end)
     proven = replace(loop.promise.ranges["u"], **{end: 0.9 * met})
     forged = replace(loop.promise, ranges={"u": proven})
     (broken,) = compare(setting, runs, forged).violations
-    assert broken.bound_of == ("input u" if end == "greatest" else "input -u")
+    assert broken.of == ("input u" if end == "greatest" else "input -u")
     assert broken.value == pytest.approx(abs(met))
     assert broken.bound == pytest.approx(0.9 * abs(met))
 
@@ -82,7 +82,7 @@ def test_a_loop_that_is_not_covered_is_told_and_not_compared(limited):
     setting, _ = limited
     loop = loop_of(setting, "ccm", Choice())
     (drawn,) = simulate(setting, [loop], count=0, seed=0).loops
-    (use,) = drawn.comparison.inputs
+    use = drawn.comparison.went["u"]
     assert use.proven is None
     assert use.greatest == drawn.runs.found.greatest.max() >= drawn.runs.u.max()
 
@@ -92,8 +92,8 @@ def test_without_limits_nothing_is_told():
     setting, _ = made(FLAT, "distance")
     loop = loop_of(setting, "l1", Choice(source="distance"))
     found = simulate(setting, [loop], count=0, seed=0)
-    assert found.loops[0].comparison.inputs == ()
-    assert all("inputs" not in part for part in found.summary("sha256:0")["loops"])
+    assert found.loops[0].comparison.went == {}
+    assert all("went" not in part for part in found.summary("sha256:0")["loops"])
 
 
 @pytest.mark.slow
@@ -129,7 +129,7 @@ limits: {{v: [-9, 9]}}
     assert own.input == "v"
     bound = own.bounds["distance"]
     for comparison in of_all(found):
-        (use,) = comparison.inputs
+        (use,) = comparison.went.values()
         assert use.proven == (bound.least, bound.greatest)
         assert bound.least <= use.least <= use.greatest <= bound.greatest
     runs = found.loops[0].runs

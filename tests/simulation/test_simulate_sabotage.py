@@ -67,15 +67,15 @@ def test_a_lie_is_found_with_seed_run_and_time(name, lie, bound):
     random, aimed = (
         part.comparison.violations for part in (found.attacks[0].random, found.attacks[0].adversary)
     )
-    assert bound in {item.bound_of for item in aimed}
-    broken = next(item for item in random if item.bound_of == bound)
+    assert bound in {item.of for item in aimed}
+    broken = next(item for item in random if item.of == bound)
     assert broken.value > broken.bound
     told = Terminal(stream=None, colored=False, width=120, interactive=False).text(
         screen(page_of(found), [], verbose=True)
     )
     assert re.search(rf"falsified l1, .* t = \S+ s, random run {broken.run}, seed {SEED}\n", told), told
     again = simulate(own, [loop], count=0, seed=SEED, replay=broken.run).loops[0].comparison
-    same = next(item for item in again.violations if item.bound_of == bound)
+    same = next(item for item in again.violations if item.of == bound)
     assert same.value == pytest.approx(broken.value, rel=1e-2)
     assert same.t == pytest.approx(broken.t, abs=0.05 * own.horizon)
 

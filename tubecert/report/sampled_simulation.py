@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Final
 
-from tubecert.digits import short, up
-from tubecert.report.claimed import ends
+from tubecert.digits import short
 from tubecert.report.page import Block, Facts, Page, Reason, Section, Table, Words
-from tubecert.report.simulation import CAVEAT
+from tubecert.report.simulation import CAVEAT, clearance, told, went
 
 if TYPE_CHECKING:
-    from tubecert.simulation.sampled.campaign import Campaign, Violation
+    from tubecert.simulation.sampled.campaign import Campaign
+    from tubecert.simulation.told import Violation
 
 _CODES: Final = {"c": "the controller is the exported C code", "floats": "the controller's tables in floats"}
 _FIRST: Final = 2  # of what broke, on the first screen
@@ -60,8 +60,7 @@ def _because(own: Campaign) -> str:
 
 
 def _told(own: Violation) -> str:
-    who, peak = f"adversary of {own.aimed}" if own.aimed else "random", own.peak
-    return f"{short(peak.value)}, proven {up(peak.bound)}; t = {short(peak.t)} s, run {peak.run} ({who})"
+    return told(own, f"run {own.run} ({f'adversary of {own.aimed}' if own.aimed else 'random'})")
 
 
 def _shares(own: Campaign) -> Table:
@@ -72,14 +71,13 @@ def _shares(own: Campaign) -> Table:
         peaks = [own.peak(i, own.aimed), own.peak(i, ~own.aimed)]
         shares = ["" if peak is None else short(peak.share, 3) for peak in peaks]
         long_run = [short(float(own.by_stage[:, i, -1].max()), 3)] * len(late)
-        most = max(filter(None, peaks), key=lambda peak: peak.share)
+        most = max(filter(None, peaks), key=lambda peak: peak.share or 0.0)
         rows.append((name, *shares, *long_run, f"t = {short(most.t)} s", str(most.run)))
     return Table.of(("attained", ">adversaries", ">random runs", *late, "at", "in run"), rows)
 
 
 def _ranges(own: Campaign) -> Iterator[tuple[str, str]]:
-    for name, went in own.went.items():
-        proven = went.proven and f", proven: {ends(*went.proven)}"
-        yield name, f"went from {short(went.least)} to {short(went.greatest)}{proven or ''}"
-    for i, passed in enumerate(own.passed, 1):
-        yield f"obstacle {i}", f"{short(passed.distance)} away at least"
+    for name, each in own.went.items():
+        ways, proven = went(each)
+        yield name, f"went from {ways}, proven: {proven}"
+    yield from ((f"distance to obstacle {i}", clearance(each)) for i, each in enumerate(own.obstacles, 1))

@@ -6,13 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from tubecert.digits import UNKNOWN, down, short, up
+from tubecert.digits import UNKNOWN, short, up
+from tubecert.report.claimed import ends
 from tubecert.report.page import Block, Facts, Page, Reason, Section, Table, Words
 
 if TYPE_CHECKING:
     from tubecert.simulation.adaptive.campaign import Campaign
-    from tubecert.simulation.adaptive.judge import Clearance, Comparison, InputUse, RunAt, Stopped, Violation
+    from tubecert.simulation.adaptive.judge import Comparison
     from tubecert.simulation.adaptive.setting import Loop
+    from tubecert.simulation.told import Clearance, RunAt, Stopped, Violation, Went
 
 CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."
 _FIRST: Final = 2  # of what broke, on the first screen
@@ -44,7 +46,7 @@ class _Part:
         """Whether the loop is meant to stay in the tube, and there are runs that say whether it does."""
         return self.loop.adapts and bool(self.comparison.worst)
 
-    def run(self, item: RunAt | Stopped | Violation) -> str:
+    def run(self, item: RunAt) -> str:
         """Which run it was."""
         return f"{self.each} {item.run}, {self.what}" if self.each else self.what
 
@@ -136,17 +138,18 @@ def _first(data: Campaign, parts: list[_Part], broken: list[Reason]) -> Iterator
 
 
 def _violation(part: _Part, item: Violation) -> Reason:
-    name, when = (
-        _WORDS.get(item.bound_of, item.bound_of),
-        "" if item.t is None else f"t = {short(item.t)} s, ",
-    )
-    bound = f"{short(item.value, 6)}, promised at most {short(item.bound, 6)}"
     return Reason(
         verdict="falsified",
-        claim=f"{part.loop.controller}, {name}",
-        message=f"{bound}; {when}{part.run(item)}",
+        claim=f"{part.loop.controller}, {_WORDS.get(item.of, item.of)}",
+        message=told(item, part.run(item)),
         relax=f"to see it alone: the same command with --replay {item.run}" if part.asked else "",
     )
+
+
+def told(item: Violation, who: str) -> str:
+    """By how much a run broke a bound, when, and `who` it was."""
+    when = "" if item.t is None else f"t = {short(item.t)} s, "
+    return f"{short(item.value, 6)}, proven at most {up(item.bound, 6)}; {when}{who}"
 
 
 def _stopped(part: _Part, item: Stopped) -> str:
@@ -182,13 +185,13 @@ def _obstacles(data: Campaign) -> Table:
     columns = ("obstacle", "plan", "tube", *(own.loop.controller for own in data.loops))
     pairs = zip(of_plan(data.setting), of_tube(data.setting), strict=True)
     rows = (
-        (str(i + 1), *map(_clearance, (plan, tube, *(own.obstacles[i] for own in data.loops))))
+        (str(i + 1), *map(clearance, (plan, tube, *(own.obstacles[i] for own in data.loops))))
         for i, (plan, tube) in enumerate(pairs)
     )
     return Table.of(columns, rows)
 
 
-def _clearance(item: Clearance) -> str:
+def clearance(item: Clearance) -> str:
     """The least distance; below zero it collides."""
     value = short(item.clearance)
     return f"collides, {value} at {short(item.t)} s" if item.collides else value
@@ -210,19 +213,19 @@ def _bounds(parts: list[_Part]) -> Iterator[Block]:
 
 def _inputs(parts: list[_Part]) -> Iterator[Block]:
     """How far every input with limits went over all runs of a loop."""
-    found: dict[tuple[str, str], InputUse] = {}
+    found: dict[tuple[str, str], Went] = {}
     for part in parts:
-        for own in part.comparison.inputs:
-            key = part.loop.controller, own.input
-            found[key] = own if key not in found else found[key].joined(own)
+        for name, own in part.comparison.went.items():
+            key = part.loop.controller, name
+            found[key] = found.get(key, own).joined(own)
     if found:
-        rows = ((*key, *_went(own)) for key, own in found.items())
+        rows = ((*key, *went(own)) for key, own in found.items())
         yield Table.of(("loop", "input", "went", "is proven to stay in"), rows)
 
 
-def _went(own: InputUse) -> tuple[str, str]:
-    stays = UNKNOWN if own.proven is None else f"[{down(own.proven[0])}, {up(own.proven[1])}]"
-    return f"[{short(own.least)}, {short(own.greatest)}]", stays
+def went(own: Went) -> tuple[str, str]:
+    """From where to where an input went, and where it is proven to stay."""
+    return f"{short(own.least)} to {short(own.greatest)}", ends(*own.proven) if own.proven else UNKNOWN
 
 
 def _about(data: Campaign) -> Iterator[Block]:

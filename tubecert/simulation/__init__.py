@@ -9,6 +9,7 @@ imports this one.
 | `vectors` | a campaign as vectors of runs; what an interruption keeps |
 | `plans` | random plans of a family, as lanes |
 | `obstacles` | how near points come to an obstacle |
+| `told` | what campaigns tell of their runs: violations, uses of inputs, clearances |
 | `figures` | colours, labels, legends, obstacles in a plane; a figure as files |
 | `folder` | a folder that is tried before any work is done, and to which the summary comes last |
 """

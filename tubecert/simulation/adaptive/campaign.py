@@ -21,18 +21,11 @@ from tubecert.progress import Phase, Progress, Step
 from tubecert.records import Json, to_json
 from tubecert.simulation.adaptive.attack import Cases, cases, worst
 from tubecert.simulation.adaptive.engine import integrate
-from tubecert.simulation.adaptive.judge import (
-    Clearance,
-    Comparison,
-    check_class,
-    compare,
-    of_plan,
-    of_run,
-    of_tube,
-)
+from tubecert.simulation.adaptive.judge import Comparison, check_class, compare, of_plan, of_run, of_tube
 from tubecert.simulation.adaptive.loops import Batch, Disturbance, Runs, joined
 from tubecert.simulation.adaptive.setting import Loop, Setting
 from tubecert.simulation.adaptive.uncertainty import usual
+from tubecert.simulation.told import Clearance
 from tubecert.simulation.vectors import finished, vectors_of
 from tubecert.trajectory import Plan
 

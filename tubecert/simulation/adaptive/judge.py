@@ -1,14 +1,14 @@
 """Runs against a promise: the largest share of every bound that was used, violations, what is no result, clearances.
 
 All numbers of a run are known up to its own error estimate, relative to rho: a bound is broken only beyond that.
-A comparison is a record of the summary as it is: runs are told by their numbers, None stands for what is no number.
+A comparison is a record of the summary as it is.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ from tubecert.simulation.adaptive.loops import Runs
 from tubecert.simulation.adaptive.reading import Promise
 from tubecert.simulation.adaptive.setting import Setting
 from tubecert.simulation.obstacles import in_plane, signed_distance
+from tubecert.simulation.told import Clearance, Peak, RunAt, Stopped, Violation, Went
 from tubecert.spec import Spec
 from tubecert.verdict import Verdict
 
@@ -34,58 +35,6 @@ _EXACT: Final = 1e-6  # what rounding may add to a bound that is met with equali
 _SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "speed")
 _LISTED: Final = 20  # of the runs that left, stopped or came to nothing
 _POINTS: Final = 2001  # of a curve, whose distances from obstacles are taken
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunAt:
-    """A run, by its number, and a time in s."""
-
-    run: int
-    t: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stopped(RunAt):
-    """A run that ended early, and why."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Use:
-    """The largest value of a quantity over some runs, its bound and share if it has one, and where it was met."""
-
-    value: float
-    bound: float | None
-    share: float | None
-    run: int
-    t: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Violation:
-    """A bound that a run broke: of what (`tube` is d(x*, x) < dbar itself), and where."""
-
-    bound_of: str
-    run: int
-    t: float | None
-    value: float | None
-    bound: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InputUse:
-    """How far an input went in some runs, and the range that is proven, if one is."""
-
-    input: str
-    least: float
-    greatest: float
-    proven: tuple[float, float] | None
-
-    def joined(self, other: InputUse) -> InputUse:
-        """Over the runs of both."""
-        least, greatest = min(self.least, other.least), max(self.greatest, other.greatest)
-        return InputUse(input=self.input, least=least, greatest=greatest, proven=self.proven or other.proven)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,11 +52,11 @@ class Comparison:
     no_result: int
     unresolved: tuple[RunAt, ...]
     stopped: tuple[Stopped, ...]
-    worst: Mapping[str, Use]
+    worst: Mapping[str, Peak]
     violations: tuple[Violation, ...]
     settled: float | None
     error_estimate: float
-    inputs: tuple[InputUse, ...] = ()
+    went: Mapping[str, Went] = field(default_factory=dict)
 
 
 class _Judged(NamedTuple):
@@ -151,19 +100,19 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
             Stopped(run=lane, t=_finite(ended[lane]), reason=reason(int(why[lane]), setting.limit))
             for lane in np.flatnonzero(why)[:_LISTED].tolist()
         ),
-        worst={name: _use(own, name, bounds.get(name)) for name in _SHOWN} if any_usable else {},
+        worst={name: _peak(own, name, bounds.get(name)) for name in _SHOWN} if any_usable else {},
         violations=tuple(_violations(own, promise)) if promise else (),
         settled=_settled(own, promise.ultimate if promise else None),
         error_estimate=float(np.max(runs.error[usable], initial=0.0)),
-        inputs=tuple(_inputs(own, promise)) if any_usable else (),
+        went=dict(_went(own, promise)) if any_usable else {},
     )
 
 
-def _use(own: _Judged, name: str, bound: float | None) -> Use:
+def _peak(own: _Judged, name: str, bound: float | None) -> Peak:
     peak, found = own.runs.found.peak[name], own.runs.found
     lane = int(np.argmax(np.where(own.usable, peak, -np.inf)))
     value, t = float(peak[lane]), float(found.peak_time[name][lane])
-    return Use(value=value, bound=bound, share=value / bound if bound else None, run=lane, t=t)
+    return Peak(value=value, bound=bound, share=value / bound if bound else None, run=lane, t=t)
 
 
 def _first_exit(own: _Judged) -> RunAt | None:
@@ -187,17 +136,15 @@ def _settled(own: _Judged, ultimate: float | None) -> float | None:
     return float(own.runs.t[after]) if after < len(own.runs.t) else None
 
 
-def _inputs(own: _Judged, promise: Promise | None) -> Iterator[InputUse]:
+def _went(own: _Judged, promise: Promise | None) -> Iterator[tuple[str, Went]]:
     """The range of every input that has limits or a proven range, over all steps of the runs that are results."""
     ranges, spec = promise.ranges if promise else {}, own.setting.spec
     for name in dict.fromkeys((*(name for name, _ in spec.limits or ()), *ranges)):
         column, stays = spec.inputs.index(name), ranges.get(name)
-        yield InputUse(
-            input=name,
-            least=float(own.runs.found.least[column, own.usable].min()),
-            greatest=float(own.runs.found.greatest[column, own.usable].max()),
-            proven=(stays.least, stays.greatest) if stays else None,
-        )
+        least = float(own.runs.found.least[column, own.usable].min())
+        greatest = float(own.runs.found.greatest[column, own.usable].max())
+        proven = (stays.least, stays.greatest) if stays else None
+        yield name, Went(least=least, greatest=greatest, proven=proven)
 
 
 def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
@@ -219,8 +166,9 @@ def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
     if promise.decay is not None:
         yield from _over_time(own, "D(t)", runs.distance, promise.decay(runs.t), own.setting.reach)
     for lane in np.flatnonzero((found.stopped != 0) & own.left).tolist():
-        t, value = _finite(found.ended[lane]), _finite(found.peak["deviation"][lane])
-        yield Violation(bound_of="tube", run=lane, t=t, value=value, bound=own.setting.rho)
+        value, rho = float(found.peak["deviation"][lane]), own.setting.rho
+        t = float(found.ended[lane])
+        yield Violation(of="tube", run=lane, t=t, value=value, bound=rho, share=value / rho)
 
 
 def _over_time(own: _Judged, name: str, values: Array, allowed: Array, scale: float) -> Iterator[Violation]:
@@ -239,7 +187,8 @@ def _broken(
     lane = int(np.argmax(excess))
     if excess[lane] > 0:
         t, value, bound = _finite(times[lane]), float(values[lane]), float(bounds[lane])
-        yield Violation(bound_of=name, run=lane, t=t, value=value, bound=bound)
+        share = value / bound if bound > 0 else None
+        yield Violation(of=name, run=lane, t=t, value=value, bound=bound, share=share)
 
 
 def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: str) -> None:
@@ -271,26 +220,11 @@ def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: 
             raise TubecertError([Finding(code="TC706", message=message, location=place, help=help)])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Clearance:
-    """The least distance to an obstacle, by its number (negative: by how much it is entered), and when in s."""
-
-    obstacle: int
-    clearance: float | None
-    t: float | None
-    collides: bool
-
-
 def of_tube(setting: Setting) -> tuple[Clearance, ...]:
     """That of the tube over the whole plan: what is proven, in the certificate."""
     return tuple(
-        Clearance(
-            obstacle=i,
-            clearance=_finite(own.clearance.below),
-            t=own.t,
-            collides=own.verdict is Verdict.REFUTED,
-        )
-        for i, own in enumerate(setting.result.clearance)
+        Clearance(clearance=_finite(own.clearance.below), t=own.t, collides=own.verdict is Verdict.REFUTED)
+        for own in setting.result.clearance
     )
 
 
@@ -301,7 +235,7 @@ def of_plan(setting: Setting) -> tuple[Clearance, ...]:
 
 
 def of_run(setting: Setting, runs: Runs) -> tuple[Clearance, ...]:
-    """That of the first run, between output times by cubics with its own slopes: no proof."""
+    """That of the first of runs, between output times by cubics with its own slopes: no proof."""
     t, x, slope = runs.t, runs.x[0], runs.slope[0]
     parts = -(-_POINTS // len(t))
     s, dt = np.arange(parts)[:, None, None] / parts, np.diff(t)[:, None]
@@ -315,11 +249,11 @@ def of_run(setting: Setting, runs: Runs) -> tuple[Clearance, ...]:
 def _of_curve(spec: Spec, t: Array, x: Array) -> tuple[Clearance, ...]:
     """That of a curve (K, n) at times (K,); nan where it has ended."""
     found = []
-    for number, obstacle in enumerate(spec.obstacles):
+    for obstacle in spec.obstacles:
         gaps = np.nan_to_num(signed_distance(obstacle, in_plane(spec, obstacle, x)), nan=np.inf)
         step = int(np.argmin(gaps))
         gap = float(gaps[step])
-        found.append(Clearance(obstacle=number, clearance=_finite(gap), t=float(t[step]), collides=gap <= 0))
+        found.append(Clearance(clearance=_finite(gap), t=float(t[step]), collides=gap <= 0))
     return tuple(found)
 
 

@@ -7,16 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial, reduce
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from tubecert.controller.recursion import linear
 from tubecert.executor import Serial
 from tubecert.progress import Progress
+from tubecert.records import to_json
 from tubecert.simulation.sampled.attack import Attack, Flags
 from tubecert.simulation.sampled.loop import DIVERGED, Controllers, Seen, resolved
 from tubecert.simulation.sampled.setting import Setting
+from tubecert.simulation.told import Clearance, Peak, Violation, Went
 from tubecert.simulation.vectors import finished, vectors_of
 from tubecert.verdict import Verdict
 
@@ -47,55 +49,22 @@ def simulate(
     return Campaign(attack, certificate, asked, "c" if controllers else "floats", found)
 
 
-class Peak(NamedTuple):
-    """The largest |x - x*| of a state, or |u - u*| of an input, as a share of its bound: in which run, at t in s."""
-
-    run: int
-    share: float
-    value: float
-    bound: float
-    t: float
-
-
-class Violation(NamedTuple):
-    """How far a run was outside: by `of`; `aimed`: what an adversary wanted, else empty."""
-
-    of: str
-    aimed: str
-    peak: Peak
-
-
-class Went(NamedTuple):
-    """Where an input was in all runs, and where it is proven to stay."""
-
-    least: float
-    greatest: float
-    proven: tuple[float, float] | None
-
-    @property
-    def beyond(self) -> bool:
-        """Whether it left what is proven, but for the rounding of a plan."""
-        room = _SINGLE * max(abs(self.least), abs(self.greatest))
-        low, high = self.proven or (self.least, self.greatest)
-        return self.least < low - room or self.greatest > high + room
-
-
-class Passed(NamedTuple):
-    """How near runs came to an obstacle (negative: into it), and whether none is proven to meet it."""
-
-    distance: float
-    run: int
-    proven: bool
+def _beyond(own: Went) -> bool:
+    """Whether an input left what is proven, but for the rounding of a plan."""
+    room = _SINGLE * max(abs(own.least), abs(own.greatest))
+    low, high = own.proven or (own.least, own.greatest)
+    return own.least < low - room or own.greatest > high + room
 
 
 class Campaign:
     """What was found in `runs` of those that were `asked`, with the `controller` as exported C code or in floats.
 
     `aimed` (N,): which were adversaries. `peaks`: of every state, then of every input, the largest `share`, (n + m, N),
-    its `value` of a `bound`, `when` in s; the largest of random runs and of adversaries by sample, `profile`
+    its `value` of a `bound`, its time `t` in s; the largest of random runs and of adversaries by sample, `profile`
     (2, n + m, K), in every stage that was reached, `by_stage` (2, n + m, G), of any half-width, `attained`. `errors`
-    (N,) of the integration as shares of a half-width, the largest `error`. Where inputs `went`, how near obstacles were
-    `passed`; which runs were `outside` of the tube by more than their error and the plan's rounding; `x` of some runs.
+    (N,) of the integration as shares of a half-width, the largest `error`. Where inputs `went`, how near runs came to
+    `obstacles`, which of these are proven to be `clear`; which runs were `outside` of the tube by more than their error
+    and the plan's rounding; `x` of some runs.
     """
 
     def __init__(
@@ -114,7 +83,7 @@ class Campaign:
         self.aimed: Flags = np.arange(self.runs) < len(attack.aims)
         share, into, ends = np.split(most, [n + m, len(most) - 2 * m])
         bound = np.take_along_axis(own.limits.T, node[: n + m], axis=1)
-        self.peaks = {"share": share, "value": share * bound, "bound": bound, "when": own.t[node[: n + m]]}
+        self.peaks = {"share": share, "value": share * bound, "bound": bound, "t": own.t[node[: n + m]]}
         self.profile = reduce(np.maximum, (part.profile for part in found))
         begun = own.stages[own.stages < own.samples]
         self.by_stage = finite(np.maximum.reduceat(self.profile, begun, axis=2))
@@ -122,10 +91,16 @@ class Campaign:
 
         proven = {use.input: (float(use.range[0]), float(use.range[1])) for use in own.result.inputs}
         went = zip(own.spec.inputs, *finite(ends.max(axis=1)).reshape(2, m).tolist(), strict=True)
-        self.went = {name: Went(-low, high, proven.get(name)) for name, low, high in went}
-        clear = {each.index for each in own.result.clearance if each.verdict is Verdict.CERTIFIED}
-        runs = zip(finite(into.max(axis=1)).tolist(), into.argmax(axis=1).tolist(), strict=True)
-        self.passed = [Passed(-most, run, i in clear) for i, (most, run) in enumerate(runs)]
+        self.went = {
+            name: Went(least=-low, greatest=high, proven=proven.get(name)) for name, low, high in went
+        }
+        self.clear = {each.index for each in own.result.clearance if each.verdict is Verdict.CERTIFIED}
+        depths, runs = finite(into.max(axis=1)).tolist(), into.argmax(axis=1).tolist()
+        times = (float(own.t[at[run]]) for at, run in zip(node[n + m :], runs, strict=False))
+        self.obstacles = [
+            Clearance(clearance=-depth, t=t, collides=depth >= 0, run=run)
+            for depth, t, run in zip(depths, times, runs, strict=True)
+        ]
         self.outside = self._outside()
 
     def _outside(self) -> list[int]:
@@ -142,8 +117,8 @@ class Campaign:
     @property
     def outcome(self) -> Literal["falsified", "no result", "interrupted", "not falsified"]:
         """What it came to."""
-        entered = any(own.proven and own.distance < 0 for own in self.passed)
-        if entered or self.outside or any(own.beyond for own in self.went.values()):
+        entered = any(own.collides and i in self.clear for i, own in enumerate(self.obstacles))
+        if entered or self.outside or any(map(_beyond, self.went.values())):
             return "falsified"
         if self.runs < self.asked:
             return "interrupted"
@@ -153,10 +128,10 @@ class Campaign:
         """Of a state or an input in some lanes (N,); None if there are none."""
         if not group.any():
             return None
-        return self._peak(index, int(np.argmax(np.where(group, self.peaks["share"][index], -1.0))))
+        return Peak(**self._met(index, int(np.argmax(np.where(group, self.peaks["share"][index], -1.0)))))
 
-    def _peak(self, index: int, number: int) -> Peak:
-        return Peak(number, *(float(own[index, number]) for own in self.peaks.values()))
+    def _met(self, index: int, number: int) -> dict[str, Any]:
+        return {"run": number} | {name: float(own[index, number]) for name, own in self.peaks.items()}
 
     @property
     def violations(self) -> list[Violation]:
@@ -166,7 +141,7 @@ class Campaign:
         for number in self.outside[:_LISTED]:
             index = int(self.peaks["share"][:, number].argmax())
             aimed = aims[number] if number < len(aims) else ""
-            found.append(Violation(names[index], aimed, self._peak(index, number)))
+            found.append(Violation(of=names[index], aimed=aimed, **self._met(index, number)))
         return found
 
     @property
@@ -184,18 +159,14 @@ class Campaign:
             "stages": (own.stages * own.Ts).tolist(),
             "states": {name: attained[name] for name in own.spec.states},
             "inputs": {name: attained[name] for name in own.spec.inputs},
-            "went": {name: went._asdict() for name, went in self.went.items()},
-            "obstacles": [passed._asdict() for passed in self.passed],
             "outside": len(self.outside),
-            "violations": [
-                {"of": of, "aimed": aimed, **peak._asdict()} for of, aimed, peak in self.violations
-            ],
+            **{name: to_json(getattr(self, name)) for name in ("went", "obstacles", "violations")},
         }
 
     def _attained(self, index: int) -> dict[str, object]:
         found = dict[str, object]()
         for g, (name, group) in enumerate((("random", ~self.aimed), ("adversary", self.aimed))):
             peak = self.peak(index, group)
-            found[name] = peak and peak._asdict()
+            found[name] = to_json(peak)
             found[f"{name}_by_stage"] = self.by_stage[g, index].tolist()
         return found
