@@ -15,7 +15,7 @@ from tubecert.certificate.result import Result
 from tubecert.simulation.adaptive.continuous import DIVERGED
 from tubecert.simulation.adaptive.engine import integrate
 from tubecert.simulation.adaptive.lanes import Found
-from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopProblem, Runs
+from tubecert.simulation.adaptive.loops import Cases, Disturbance, LoopProblem, Runs
 from tubecert.simulation.adaptive.reading import adopted
 from tubecert.simulation.adaptive.setting import Setting, setting_of
 from tubecert.spec import Spec, load, load_text
@@ -43,9 +43,9 @@ def setting(name: str, epsilon: str | None = None, duration: str | None = None) 
 
 
 def alone(problem: LoopProblem, x0: np.ndarray, disturbance: Disturbance, *, tolerance: float) -> Runs:
-    """The runs of one batch."""
-    batch = Batch(problem=problem, x0=np.asarray(x0, dtype=float), disturbance=disturbance)
-    return integrate([batch], tolerance=tolerance)[0]
+    """Runs from x0 (N, n)."""
+    cases = Cases(np.asarray(x0, dtype=float).T, disturbance)
+    return integrate([(problem, cases)], tolerance=tolerance)[0]
 
 
 def runs(

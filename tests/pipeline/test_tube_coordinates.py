@@ -279,7 +279,7 @@ def test_simulations_stay_within_what_is_certified(tube):
     setting = setting_of(spec, result)
     for source in ("26", "distance"):
         loop = loop_of(setting, "l1", Choice(source=source))
-        (runs,) = integrate([cases(setting, 0, range(6)).of(loop)], tolerance=setting.tolerance)
+        (runs,) = integrate([(loop, cases(setting, 0, range(6)))], tolerance=setting.tolerance)
         found = compare(setting, runs, loop.promise)
         assert not found.violations
         assert not found.left_the_tube

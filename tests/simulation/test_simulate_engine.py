@@ -14,7 +14,7 @@ from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
 from tubecert.simulation.adaptive.engine import _Lanes, integrate
 from tubecert.simulation.adaptive.lanes import follow
-from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopGains, LoopProblem
+from tubecert.simulation.adaptive.loops import Cases, Disturbance, LoopGains, LoopProblem
 from tubecert.simulation.adaptive.times import output_times
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
@@ -181,7 +181,7 @@ def scalar(f, B):
 
 def levels(case, x0, h, count):
     """x at the output times (K, n) for one level of steps after the other."""
-    batch = Batch(problem=case, x0=x0, disturbance=Disturbance.from_expressions(h, case.model, 1))
+    batch = case, Cases(x0.T, Disturbance.from_expressions(h, case.model, 1))
     lanes = _Lanes([batch], None)
     return [follow(lanes.system(np.arange(1), j)).seen["x"][..., 0] for j in range(count)]
 
@@ -361,7 +361,7 @@ def test_loops_along_several_plans_are_lanes_of_one_vector():
         plans.append(piecewise_plan(TWO, Knots(t=tuple(e for (e,) in t), x=x, u=u, interpolation="hold")))
     still = Disturbance.from_expressions(wavy_h(), TWO, 1)
     batches = [
-        Batch(problem=problem(name, plan=plan, gains=gains), x0=START, disturbance=still)
+        (problem(name, plan=plan, gains=gains), Cases(np.asarray(START).T, still))
         for plan in plans
         for name in ("ccm", "l1")
     ]

@@ -68,7 +68,7 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
 def test_no_bound_is_exceeded_by_adversaries_whose_parameters_differ():
     setting, own = stirred("B"), loop("B")
     drawn = cases(setting, 3, range(60))
-    (runs,) = engine.integrate([drawn.of(own)], tolerance=setting.tolerance)
+    (runs,) = engine.integrate([(own, drawn)], tolerance=setting.tolerance)
     found = compare(setting, runs, own.promise)
     assert own.promise is not None
     assert not found.violations

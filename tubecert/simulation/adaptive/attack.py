@@ -8,31 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from tubecert.enclosure.interval import Array
 from tubecert.progress import Phase, Progress, Step
 from tubecert.simulation.adaptive.engine import integrate
-from tubecert.simulation.adaptive.loops import Batch, Disturbance, LoopProblem, Runs
+from tubecert.simulation.adaptive.loops import Cases, Disturbance, Runs
 from tubecert.simulation.adaptive.setting import Loop, Setting
-from tubecert.simulation.adaptive.uncertainty import Waves, acting, adversaries, random_members
+from tubecert.simulation.adaptive.uncertainty import acting, adversaries, random_members
 
 _POPULATION, _ELITE, _ROUNDS = 256, 12, 4
 _COARSER: Final = 3  # times: the steps of runs that are only compared
 _MOVED: Final = 0.3  # of the width of a gene, at first
-
-
-class Cases(NamedTuple):
-    """N runs: starts (N, n), and what acts on each of them."""
-
-    start: Array
-    h: Disturbance
-
-    def of(self, problem: LoopProblem) -> Batch:
-        """These runs of a loop."""
-        return Batch(problem=problem, x0=self.start, disturbance=self.h)
 
 
 def cases(setting: Setting, seed: int, numbers: Sequence[int]) -> Cases:
@@ -40,36 +29,46 @@ def cases(setting: Setting, seed: int, numbers: Sequence[int]) -> Cases:
     kind, n = setting.uncertainty, len(setting.x0)
     sizes = np.cumsum([1, kind.member, kind.adversary, kind.beside, n + 2])
     seeds = [np.random.SeedSequence(entropy=seed, spawn_key=(number,)) for number in numbers]
-    genes = np.array([np.random.default_rng(each).random(sizes[-1]) for each in seeds])
-    coin, own, aimed, beside, begin = np.split(genes, sizes[:-1], axis=1)
+    genes = np.stack([np.random.default_rng(each).random(sizes[-1]) for each in seeds], axis=1)
+    (coin,), own, aimed, beside, begin = np.split(genes, sizes[:-1])
     start = _random_starts(setting, begin)
-    offset = (start - setting.centre) @ setting.S.T
+    offset = setting.S @ (start - setting.centre[:, None])
     both = random_members(kind, own, offset), adversaries(kind, aimed, offset, setting.layer)
-    chosen = (np.where(coin.reshape(-1, *[1] * (a.ndim - 1)) < 0.5, a, b) for a, b in zip(*both, strict=True))
-    return _cases(setting, start, Waves(*chosen), beside)
+    chosen = (np.where(coin < 0.5, a, b) for a, b in zip(both[0][1:], both[1][1:], strict=True))
+    return _cases(setting, start, Disturbance(None, *chosen), beside)
 
 
-def _cases(setting: Setting, start: Array, waves: Waves, beside: Array) -> Cases:
-    """The class is one of functions of z = S x."""
-    waves = waves._replace(wave=waves.wave @ setting.S)
-    return Cases(start, acting(setting.uncertainty, waves, beside, setting.centre, setting.layer))
+def _cases(setting: Setting, start: Array, h: Disturbance, beside: Array) -> Cases:
+    """Members of the class, which is one of functions of z = S (x - centre), as functions of x.
+
+    What they add up to is clipped beside a wind only: every h is in the class.
+    """
+    kind, N = setting.uncertainty, start.shape[1]
+    wave = np.einsum("win,ij->wjn", h.wave, setting.S)
+    h = h._replace(
+        wave=wave,
+        phase=h.phase - np.einsum("wjn,j->wn", wave, setting.centre),
+        radius=np.full(N, kind.h if kind.beside else np.inf),
+        layer=np.full(N, setting.layer),
+    )
+    return Cases(start, acting(kind, h, beside))
 
 
 def _random_starts(setting: Setting, genes: Array) -> Array:
-    """The initial state, or points of the ball or the box that is allowed (its surface, half of the time), (N, n)."""
+    """The initial state, or points of the ball or the box that is allowed (its surface, half of the time), (n, N)."""
     n = len(setting.x0)
-    direction, outside, radius = 2 * genes[:, :n] - 1, genes[:, n] < 0.5, genes[:, n + 1] ** (1 / n)
+    direction, outside, radius = 2 * genes[:n] - 1, genes[n] < 0.5, genes[n + 1] ** (1 / n)
     if not setting.within:
-        direction = np.where(outside[:, None], np.sign(direction), direction)
-    return setting.started(direction, np.where(outside, 1.0, radius)[:, None])
+        direction = np.where(outside, np.sign(direction), direction)
+    return setting.started(direction, np.where(outside, 1.0, radius))
 
 
 def bred(setting: Setting, genes: Array) -> Cases:
-    """The adversaries that genes (N, G) in [0, 1] describe, and where their runs start."""
+    """The adversaries that genes (G, N) in [0, 1] describe, and where their runs start."""
     kind = setting.uncertainty
-    aimed, beside, begin = np.split(genes, np.cumsum([kind.adversary, kind.beside]), axis=1)
-    start = setting.started(2 * begin - 1 if setting.varied else np.zeros((len(genes), 1)))
-    offset = (start - setting.centre) @ setting.S.T
+    aimed, beside, begin = np.split(genes, np.cumsum([kind.adversary, kind.beside]))
+    start = setting.started(2 * begin - 1 if setting.varied else np.zeros((len(setting.x0), genes.shape[1])))
+    offset = setting.S @ (start - setting.centre[:, None])
     return _cases(setting, start, adversaries(kind, aimed, offset, setting.layer), beside)
 
 
@@ -87,13 +86,13 @@ def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress
         if report is not None:
             done, of = turn * _POPULATION, _ROUNDS * _POPULATION
             report(Step(phase=Phase.SIMULATION, name=f"{loop.controller}, adversary", done=done, of=of))
-        (runs,) = integrate([bred(setting, genes).of(loop)], tolerance=setting.tolerance, count=count)
+        (runs,) = integrate([(loop, bred(setting, genes.T))], tolerance=setting.tolerance, count=count)
         found = np.nan_to_num(runs.found.peak["distance"], nan=np.inf)
         pool, values = np.vstack([kept, genes]), np.concatenate([scores, found])
         order = np.argsort(-values, kind="stable")[:_ELITE]
         kept, scores = pool[order], values[order]
         genes = children(kept, _POPULATION, 0.5 ** (turn + 1), rng)
-    return bred(setting, kept[:1])
+    return bred(setting, kept[:1].T)
 
 
 def children(parents: Array, count: int, spread: float, rng: np.random.Generator) -> Array:

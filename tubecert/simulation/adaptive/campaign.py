@@ -19,10 +19,10 @@ import numpy as np
 from tubecert.executor import Executor, Serial
 from tubecert.progress import Phase, Progress, Step
 from tubecert.records import Json, to_json
-from tubecert.simulation.adaptive.attack import Cases, cases, worst
+from tubecert.simulation.adaptive.attack import cases, worst
 from tubecert.simulation.adaptive.engine import integrate
 from tubecert.simulation.adaptive.judge import Comparison, check_class, compare, of_plan, of_run, of_tube
-from tubecert.simulation.adaptive.loops import Batch, Disturbance, Runs, joined
+from tubecert.simulation.adaptive.loops import Batch, Cases, Disturbance, Runs, joined
 from tubecert.simulation.adaptive.setting import Loop, Setting
 from tubecert.simulation.adaptive.uncertainty import usual
 from tubecert.simulation.told import Clearance
@@ -164,7 +164,7 @@ def _attack_data(attack: Attack, setting: Setting) -> dict[str, object]:
         start, h = found.case
         drawn = {"h": _WAVES} | ({"beside": _BESIDE} if setting.uncertainty.beside else {})
         waves = {of: {name: getattr(h, name)[..., 0].tolist() for name in drawn[of]} for of in drawn}
-        data["adversary"] = {**to_json(found.comparison), "start": start[0].tolist(), **waves}
+        data["adversary"] = {**to_json(found.comparison), "start": start[:, 0].tolist(), **waves}
     return data
 
 
@@ -221,13 +221,13 @@ def _specified(setting: Setting) -> Cases:
     own = Disturbance.from_expressions(setting.h, setting.model, 1)
     if setting.uncertainty.beside:
         own = usual(setting.uncertainty, own)
-    return Cases(setting.started(np.ones((1, len(setting.x0)))), own)
+    return Cases(setting.started(np.ones((len(setting.x0), 1))), own)
 
 
 def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numbers: range) -> list[Runs]:
     """Some random runs of every loop that adapts; before the first of them those of all loops that are drawn."""
-    drawn = [own.of(loop) for loop in loops if not numbers.start]
-    random = [cases(setting, seed, numbers).of(loop) for loop in loops if loop.adapts and numbers]
+    drawn = [(loop, own) for loop in loops if not numbers.start]
+    random = [(loop, cases(setting, seed, numbers)) for loop in loops if loop.adapts and numbers]
     found = integrate(drawn + random, tolerance=setting.tolerance)
     return [*found[: len(drawn)], *(runs.with_only(_KEPT) for runs in found[len(drawn) :])]
 
@@ -235,7 +235,7 @@ def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numb
 def _adversary(setting: Setting, random: Followed, seed: int, report: Progress | None) -> Followed:
     """The worst run that a search finds."""
     found = worst(setting, random.loop, seed, random.runs, report)
-    (runs,) = integrate([found.of(random.loop)], tolerance=setting.tolerance)
+    (runs,) = integrate([(random.loop, found)], tolerance=setting.tolerance)
     return Followed.judged(setting, random.loop, runs, found)
 
 
@@ -282,6 +282,6 @@ def _along(
     batches = list[list[Batch]]()
     for number, plan in enumerate(plans, first):
         own = cases(setting.along(plan), seed, range(number * each, (number + 1) * each))
-        batches.append([own.of(replace(loop, plan=plan)) for loop in loops])
+        batches.append([(replace(loop, plan=plan), own) for loop in loops])
     runs = integrate([batch for part in batches for batch in part], tolerance=setting.tolerance)
     return [joined([run.with_only(_KEPT) for run in runs[i :: len(loops)]]) for i in range(len(loops))]

@@ -24,7 +24,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.acting import Acting
 from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, times
 from tubecert.simulation.adaptive.geodesics import FOUND, REASONS, Geodesic, Geodesics
-from tubecert.simulation.adaptive.loops import Batch
+from tubecert.simulation.adaptive.loops import Batch, Disturbance
 from tubecert.simulation.adaptive.times import END, MIDDLE, START, Grid, Reference
 from tubecert.simulation.plans import SHARES
 from tubecert.trajectory import Plan
@@ -66,14 +66,18 @@ class Continuous:
     kept = ("x", "off", "slope", "u", "k", "u_a", "sigma_hat", "h", "xtilde", "distance")
 
     def __init__(self, batches: Sequence[Batch], grid: Grid, plans: Sequence[Plan]) -> None:
-        first = batches[0].problem
+        first = batches[0][0]
         n, m = len(first.model.states), len(first.model.inputs)
-        problems = [batch.problem for batch in batches for _ in batch.x0]
+        problems = [problem for problem, cases in batches for _ in cases.start.T]
         self.grid, self._N = grid, len(problems)
         self._decay = 2 * float(first.model.rate)
         self._P = np.eye(n) if first.P is None else first.P
-        self._x0 = np.concatenate([batch.x0 for batch in batches]).T
-        self._acting = Acting([batch.acting for batch in batches], first.model, first.E, first.rest)
+        self._x0 = np.hstack([cases.start for _, cases in batches])
+        acting = [
+            Disturbance.nothing(n, m, cases.start.shape[1]) if problem.controller == "nominal" else cases.h
+            for problem, cases in batches
+        ]
+        self._acting = Acting(acting, first.model, first.E, first.rest)
         self._geodesics = Geodesics(first.model, first.degree, self._N)
         self._at, self._blown = blocks(n, m), bool(first.E or first.rest)
         self._forces = m + n * self._blown

@@ -39,8 +39,8 @@ def integrate(batches: Sequence[Batch], *, tolerance: float, count: int | None =
     lanes = _Lanes(batches, count)
     best = _resolved(lanes, tolerance) if count is None else follow(lanes.system(np.arange(lanes.N), 0))
     runs = list[Runs]()
-    for batch, a, b in lanes.parts():
-        plan = next(i for i, each in enumerate(lanes.plans) if each is batch.problem.plan)
+    for (problem, _), a, b in lanes.parts():
+        plan = next(i for i, each in enumerate(lanes.plans) if each is problem.plan)
         x, u = (each[lanes.grid.outputs, START, :, plan] for each in (lanes.grid.plan.x, lanes.grid.plan.u))
         runs.append(Runs(t=lanes.times, x_plan=x, u_plan=u, found=of_some(best, slice(a, b))))
     return tuple(runs)
@@ -50,13 +50,13 @@ class _Lanes:
     """The lanes of all batches, which can be run in the steps of any level; `grid` is that of the first."""
 
     def __init__(self, batches: Sequence[Batch], count: int | None) -> None:
-        first = batches[0].problem
+        first = batches[0][0]
         self._batches, self._P = batches, first.P
-        self.plans = list({id(batch.problem.plan): batch.problem.plan for batch in batches}.values())
-        self._ends = np.cumsum([0, *(len(batch.x0) for batch in batches)]).tolist()
+        self.plans = list({id(problem.plan): problem.plan for problem, _ in batches}.values())
+        self._ends = np.cumsum([0, *(own.start.shape[1] for _, own in batches)]).tolist()
         self.N, self.times = self._ends[-1], first.times if count is None else np.array([0.0, first.horizon])
         self.grid = steps(first, 0, self.plans, count)
-        gains = [batch.problem.gains for batch in batches]
+        gains = [problem.gains for problem, _ in batches]
         radius = [np.inf if own is None else own.projection_radius for own in gains]
         self._room = np.repeat(radius, np.diff(self._ends)) * _ESTIMATE
 
@@ -66,9 +66,10 @@ class _Lanes:
 
     def system(self, lanes: Places, level: int) -> Continuous:
         """Some of the lanes at a level."""
-        own = [batch.of(lanes[(lanes >= a) & (lanes < b)] - a) for batch, a, b in self.parts()]
-        grid = steps(self._batches[0].problem, level, self.plans) if level else self.grid
-        return Continuous([batch for batch in own if len(batch.x0)], grid, self.plans)
+        some = [(batch, lanes[(lanes >= a) & (lanes < b)] - a) for batch, a, b in self.parts()]
+        grid = steps(self._batches[0][0], level, self.plans) if level else self.grid
+        own = [(problem, cases.of(each)) for (problem, cases), each in some if len(each)]
+        return Continuous(own, grid, self.plans)
 
     def apart(self, lanes: Places, finer: Found, coarser: Found) -> tuple[Array, Array]:
         """|S x| of differences (K, N), and those of sigma_hat and its peak, of the room that they have, (N,)."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,30 +112,28 @@ class Disturbance(NamedTuple):
         cls, base: tuple[Expression, ...] | None, model: ControlAffineModel, lanes: int, k: int = 0
     ) -> Disturbance:
         """The same h, given by expressions of t and the states, on every lane; none of k winds."""
-        n, m = len(model.states), len(model.inputs)
+        return cls.nothing(len(model.states), len(model.inputs), lanes, k)._replace(base=base)
+
+    @classmethod
+    def nothing(cls, n: int, m: int, lanes: int, k: int = 0) -> Disturbance:
+        """Nothing for n states, m inputs and k winds."""
         waves, others = ((0, m), (0,), (0, n), (0,)), ((), (), (k,), (2,), (0,))
         none = [np.zeros((*shape, lanes)) for shape in (*waves, (), (), (), *others)]
-        return cls(base, *none)._replace(radius=np.full(lanes, np.inf), layer=np.full(lanes, 1e-3))
+        return cls(None, *none)._replace(radius=np.full(lanes, np.inf), layer=np.full(lanes, 1e-3))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Batch:
-    """N runs of a loop from x0 (N, n) under a disturbance of N lanes."""
+class Cases(NamedTuple):
+    """N runs: starts (n, N), and what acts on each of them."""
 
-    problem: LoopProblem
-    x0: Array
-    disturbance: Disturbance
+    start: Array
+    h: Disturbance
 
-    @property
-    def acting(self) -> Disturbance:
-        """What acts on the loop: nothing on one that is run without any disturbance."""
-        if self.problem.controller != "nominal":
-            return self.disturbance
-        return Disturbance.from_expressions(None, self.problem.model, len(self.x0))
+    def of(self, lanes: NDArray[np.intp]) -> Cases:
+        """Some of them, given by their numbers."""
+        return Cases(self.start[:, lanes], self.h.of(lanes))
 
-    def of(self, lanes: NDArray[np.intp]) -> Batch:
-        """Some of the runs, given by their numbers."""
-        return replace(self, x0=self.x0[lanes], disturbance=self.disturbance.of(lanes))
+
+Batch: TypeAlias = tuple[LoopProblem, Cases]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

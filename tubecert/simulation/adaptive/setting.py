@@ -67,13 +67,12 @@ class Setting(Certified):
         return self.within > 0 or bool(self.spread.any())
 
     def started(self, direction: Array, radius: Array | float = 1.0) -> Array:
-        """Starts (N, n) in directions: at parts (N, 1) of the ball's radius, or in the box (|direction_i| <= 1)."""
+        """Starts (n, N) in directions: at parts (N,) of the ball's radius, or in the box (|direction_i| <= 1)."""
         if self.within:
-            length = np.linalg.norm(direction, axis=1, keepdims=True)
-            return np.asarray(
-                self.centre + self.within * radius * direction / np.where(length > 0, length, 1.0)
-            )
-        return np.asarray(self.x0 + self.spread * direction)
+            length = np.linalg.norm(direction, axis=0)
+            away = self.within * radius * direction / np.where(length > 0, length, 1.0)
+            return np.asarray(self.centre[:, None] + away)
+        return np.asarray(self.x0[:, None] + self.spread[:, None] * direction)
 
     def along(self, plan: Plan) -> Setting:
         """The same around another plan of the family that is certified; the state starts on it, or `within` of it."""

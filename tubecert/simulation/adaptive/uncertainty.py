@@ -7,13 +7,13 @@ An adversary is a triangular wave in w t + q'(x - centre) + p: it moves as fast 
 filter of bandwidth omega misses of h what it moves within 1/omega. Its Fejer mean is used, which has the bounds of the
 triangle: slope at most 1, and no overshoot. Where metric and inputs are constant, a part of h may push along B'M g_s.
 
-Genes (N, G) in [0, 1] describe N members, one for each lane, and what acts beside them.
+Genes (G, N) in [0, 1] describe N members, one for each lane, and what acts beside them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -71,16 +71,6 @@ class Class:
         return 3 + count if count else 0
 
 
-class Waves(NamedTuple):
-    """N members: amplitude (N, W, m), frequency (N, W), wave (N, W, n), phase (N, W) and push (N,)."""
-
-    amplitude: Array
-    frequency: Array
-    wave: Array
-    phase: Array
-    push: Array
-
-
 def class_of(certified: Certified, model: ControlAffineModel) -> Class:
     """The class that a certificate is about; pushes only where the metric and B are constant."""
     constants = {name: certified[name] for name in ("h", "h_x", "h_t", "h_initial")}
@@ -102,33 +92,35 @@ def class_of(certified: Certified, model: ControlAffineModel) -> Class:
     )
 
 
-def random_members(kind: Class, genes: Array, offset: Array) -> Waves:
-    """Random members for starts that are `offset` (N, n) from the centre; often at the limits of the class."""
-    own, each = genes[:, :6], genes[:, 6:].reshape(len(genes), WAVES, -1)
-    raw = (-np.log1p(-each[..., 0])) ** _UNEVEN
-    part = np.where(own[:, 0] < _FAINT, own[:, 1], 1.0)[:, None]
-    size = kind.h * _ROUND * part * raw / np.maximum(raw.sum(axis=1, keepdims=True), _TINY)
+def random_members(kind: Class, genes: Array, offset: Array) -> Disturbance:
+    """Random members for starts that are `offset` (n, N) from the centre; often at the limits of the class."""
+    own, each = genes[:6], genes[6:].reshape(WAVES, -1, genes.shape[1])
+    raw = (-np.log1p(-each[:, 0])) ** _UNEVEN
+    part = np.where(own[0] < _FAINT, own[1], 1.0)
+    size = kind.h * _ROUND * part * raw / np.maximum(raw.sum(axis=0), _TINY)
     rates, steepness = (
-        _budgeted(10 ** (2.5 * each[..., 1 + i] - 1.5), size, bound * _share(own[:, 2 + 2 * i : 4 + 2 * i]))
+        _budgeted(10 ** (2.5 * each[:, 1 + i] - 1.5), size, bound * _share(own[2 + 2 * i : 4 + 2 * i]))
         for i, bound in enumerate((kind.h_t, kind.h_x))
     )
-    amplitude, wave = size[..., None] * _unit(each[..., 4 : 4 + kind.m]), _unit(each[..., 4 + kind.m :])
-    wave *= steepness[..., None]
-    base = np.einsum("nwi,ni->nw", wave, offset)
-    angle = np.remainder(base + 2 * np.pi * each[..., 3] + np.pi, 2 * np.pi) - np.pi
-    push = np.zeros(len(genes))
-    return Waves(amplitude, rates, wave, _begun(kind, amplitude, angle, push) - base, push)
+    amplitude, wave = size[:, None] * _unit(each[:, 4 : 4 + kind.m]), _unit(each[:, 4 + kind.m :])
+    wave *= steepness[:, None]
+    base = (wave * offset).sum(axis=1)
+    angle = np.remainder(base + 2 * np.pi * each[:, 3] + np.pi, 2 * np.pi) - np.pi
+    push = np.zeros(genes.shape[1])
+    phase = _begun(kind, amplitude, angle, push) - base
+    still = Disturbance.nothing(kind.n, kind.m, len(push))
+    return still._replace(amplitude=amplitude, frequency=rates, wave=wave, phase=phase, push=push)
 
 
 def _share(genes: Array) -> Array:
     """How much of a bound is used: all of it, half of the time."""
-    return np.asarray(np.where(genes[:, 0] < 0.5, _ROUND, genes[:, 1]))
+    return np.asarray(np.where(genes[0] < 0.5, _ROUND, genes[1]))
 
 
 def _budgeted(raw: Array, size: Array, budget: Array) -> Array:
-    """The rates (N, W), scaled so that sum size * rate is the budget (N,)."""
-    used = np.sum(size * raw, axis=1)
-    return np.asarray(raw * np.where(used > 0, budget / np.maximum(used, _TINY), 0.0)[:, None])
+    """The rates (W, N), scaled so that sum size * rate is the budget (N,)."""
+    used = np.sum(size * raw, axis=0)
+    return np.asarray(raw * np.where(used > 0, budget / np.maximum(used, _TINY), 0.0))
 
 
 def triangle(waves: int) -> tuple[Array, Array]:
@@ -138,24 +130,24 @@ def triangle(waves: int) -> tuple[Array, Array]:
     return j, np.asarray(4 / np.pi * weight * (-1.0) ** np.arange(waves) / j**2)
 
 
-def adversaries(kind: Class, genes: Array, offset: Array, layer: float) -> Waves:
+def adversaries(kind: Class, genes: Array, offset: Array, layer: float) -> Disturbance:
     """Those of genes for frequency, phase, shares of h_x and push, directions; starts as for random members.
 
     Whatever the frequency, the wave moves as fast, or as far, as the class allows.
     """
-    (j, c), last = triangle(WAVES), 4 + kind.n
-    frequency = 10.0 ** (3 * genes[:, 0] - 1.5) * (kind.h_t / kind.h if kind.h > 0 else 1.0)
-    push, slope, rate = _pushed(kind, genes[:, 3], layer)
+    (j, c), last = (each[:, None] for each in triangle(WAVES)), 4 + kind.n
+    frequency = 10.0 ** (3 * genes[0] - 1.5) * (kind.h_t / kind.h if kind.h > 0 else 1.0)
+    push, slope, rate = _pushed(kind, genes[3], layer)
     room = [bound * _ROUND - used for bound, used in ((kind.h, push), (kind.h_x, slope), (kind.h_t, rate))]
     height = np.maximum(0.0, np.minimum(room[0] / np.abs(c).sum(), _over(room[2], frequency)))
-    steepness = np.where(height > 0, genes[:, 2] * _over(room[1], height), 0.0)
-    q = steepness[:, None] * _unit(genes[:, 4:last])
-    wave = j[:, None] * q[:, None, :]
-    amplitude = (height[:, None] * c)[..., None] * _unit(genes[:, last : last + kind.m])[:, None, :]
-    base = np.einsum("ni,ni->n", q, offset)
-    angle = np.remainder(base + 2 * np.pi * genes[:, 1] + np.pi, 2 * np.pi) - np.pi
-    begun = _begun(kind, amplitude, angle[:, None] * j, push)
-    return Waves(amplitude, frequency[:, None] * j, wave, begun - base[:, None] * j, push)
+    steepness = np.where(height > 0, genes[2] * _over(room[1], height), 0.0)
+    q = steepness * _unit(genes[4:last])
+    amplitude = (c * height)[:, None] * _unit(genes[last : last + kind.m])
+    base = (q * offset).sum(axis=0)
+    angle = np.remainder(base + 2 * np.pi * genes[1] + np.pi, 2 * np.pi) - np.pi
+    phase = _begun(kind, amplitude, j * angle, push) - j * base
+    still, wave = Disturbance.nothing(kind.n, kind.m, len(push)), j[:, None] * q
+    return still._replace(amplitude=amplitude, frequency=j * frequency, wave=wave, phase=phase, push=push)
 
 
 def _pushed(kind: Class, share: Array, layer: float) -> tuple[Array, Array, Array]:
@@ -174,62 +166,49 @@ def _over(a: Array, b: Array) -> Array:
 
 
 def _unit(genes: Array) -> Array:
-    """Directions (..., n)."""
+    """Directions (.., n, N)."""
     vector = 2 * genes - _NOWHERE
-    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), _TINY))
+    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-2, keepdims=True), _TINY))
 
 
 def _begun(kind: Class, amplitude: Array, angle: Array, push: Array) -> Array:
-    """The angles (N, W) of the waves at the start, moved towards zeros as |h(0, x(0))| <= H0 asks for, all alike."""
+    """The angles (W, N) of the waves at the start, moved towards zeros as |h(0, x(0))| <= H0 asks for, all alike."""
     room = np.maximum(0.0, kind.h_initial - push)
 
     def fits(share: Array) -> Array:
-        h = np.einsum("nw,nwm->nm", np.sin(share[:, None] * angle), amplitude)
-        return np.asarray(np.linalg.norm(h, axis=1) <= room)
+        h = (np.sin(share * angle)[:, None] * amplitude).sum(axis=0)
+        return np.asarray(np.linalg.norm(h, axis=0) <= room)
 
-    low, high = np.zeros(len(angle)), np.ones(len(angle))
+    low, high = np.zeros(len(push)), np.ones(len(push))
     low = np.where(fits(high), 1.0, low)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         good = fits(middle)
         low, high = np.where(good, middle, low), np.where(good, high, middle)
-    return np.asarray(low[:, None] * angle)
+    return np.asarray(low * angle)
 
 
-def beside_of(kind: Class, genes: Array) -> dict[str, Array]:
-    """Genes of N lanes: the aim of the wind, how fast it turns, its phase, its direction, the parameters."""
-    low, high = kind.ranges.T
+def acting(kind: Class, h: Disturbance, genes: Array) -> Disturbance:
+    """h beside a wind and parameters.
+
+    Genes (.., N): the aim of the wind, how fast it turns, its phase, its direction, the parameters.
+    """
     if not kind.beside:
-        genes = np.zeros((len(genes), 3))
-    turns = np.where(genes[:, 1] > _STEADY, kind.pace * 10 ** (4 * genes[:, 1] - 1), 0.0)
-    share = np.clip(_ENDS * (genes[:, 3 + kind.k :] - 0.5) + 0.5, 0.0, 1.0)
-    return {
-        "wind": np.full(len(genes), kind.wind * _ROUND),
-        "aim": np.floor(2.999 * genes[:, 0]),
-        "blowing": _unit(genes[:, 3 : 3 + kind.k]).T,
-        "gusting": np.stack([turns, 2 * np.pi * np.where(turns > 0, genes[:, 2], 0.25)]),
-        "theta": (low + (high - low) * share).T,
-    }
+        return h
+    low, high = kind.ranges.T[..., None]
+    turns = np.where(genes[1] > _STEADY, kind.pace * 10 ** (4 * genes[1] - 1), 0.0)
+    share = np.clip(_ENDS * (genes[3 + kind.k :] - 0.5) + 0.5, 0.0, 1.0)
+    return h._replace(
+        wind=np.full(len(turns), kind.wind * _ROUND),
+        aim=np.floor(2.999 * genes[0]),
+        blowing=_unit(genes[3 : 3 + kind.k]),
+        gusting=np.stack([turns, 2 * np.pi * np.where(turns > 0, genes[2], 0.25)]),
+        theta=low + (high - low) * share,
+    )
 
 
 def usual(kind: Class, h: Disturbance) -> Disturbance:
     """An h that is given for one lane, beside a wind that blows outward and does not turn."""
-    genes = np.full((1, kind.beside), 0.5)
-    genes[:, 1:2] = 0.0
-    return Disturbance(**(h._asdict() | beside_of(kind, genes)))
-
-
-def acting(kind: Class, waves: Waves, genes: Array, centre: Array, layer: float) -> Disturbance:
-    """Members about a centre, and what acts beside them.
-
-    What it adds up to is clipped beside a wind only: every h is in the class.
-    """
-    N = len(genes)
-    waves = waves._replace(phase=waves.phase - waves.wave @ centre)
-    return Disturbance(
-        base=None,
-        radius=np.full(N, kind.h if kind.beside else np.inf),
-        layer=np.full(N, layer),
-        **{name: np.moveaxis(part, 0, -1) for name, part in waves._asdict().items()},
-        **beside_of(kind, genes),
-    )
+    genes = np.full((kind.beside, 1), 0.5)
+    genes[1:2] = 0.0
+    return acting(kind, h, genes)
