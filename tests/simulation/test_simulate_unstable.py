@@ -116,7 +116,8 @@ def test_what_is_no_result_and_what_is_missing_is_told(error, interrupted, outco
         "unresolved": np.array([2.5 if error > 0.01 else np.nan]),
     }
     made = runs_by_hand(t, still, distance, **doubt)
-    drawn = Followed(loop=own, runs=made, comparison=compare(where, made, replace(own.promise, decay=None)))
+    compared = compare(where, made, replace(own.promise, decay=None))
+    drawn = Followed(kind="one", loop=own, runs=made, comparison=compared)
     kept = {"uncertainty": SPECIFIED, "attacks": (), "seed": 0, "interrupted": interrupted}
     data, words = words_of(Campaign(setting=where, loops=(drawn,), **kept))
     assert data["outcome"] == outcome

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from tubecert.digits import UNKNOWN, short, up
@@ -11,7 +10,7 @@ from tubecert.report.claimed import ends
 from tubecert.report.page import Block, Facts, Page, Reason, Section, Table, Words
 
 if TYPE_CHECKING:
-    from tubecert.simulation.adaptive.campaign import Campaign
+    from tubecert.simulation.adaptive.campaign import Campaign, Followed
     from tubecert.simulation.adaptive.judge import Comparison
     from tubecert.simulation.adaptive.setting import Loop
     from tubecert.simulation.told import Clearance, RunAt, Stopped, Violation, Went
@@ -30,36 +29,14 @@ _WORDS: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Part:
-    """Runs of a loop: in a word, and what they are about; `each`: what one of many is, which `--replay` may show."""
-
-    loop: Loop
-    comparison: Comparison
-    word: str
-    what: str
-    each: str = ""
-    asked: int = 0
-
-    @property
-    def counts(self) -> bool:
-        """Whether the loop is meant to stay in the tube, and there are runs that say whether it does."""
-        return self.loop.adapts and bool(self.comparison.worst)
-
-    def run(self, item: RunAt) -> str:
-        """Which run it was."""
-        return f"{self.each} {item.run}, {self.what}" if self.each else self.what
-
-
 def page_of(data: Campaign) -> Page:
     """The page of a campaign."""
-    parts = list(_parts(data))
     return Page(
         name=data.setting.spec.name,
         verdict=data.outcome,
-        summary=_because(data, [part.comparison for part in parts if part.loop.adapts]),
+        summary=_because(data, [part.comparison for part in data.followed if part.loop.adapts]),
         meaning=CAVEAT,
-        sections=tuple(Section.each(_sections(data, parts))),
+        sections=tuple(Section.each(_sections(data))),
         about="simulation",
     )
 
@@ -89,59 +66,49 @@ def _runs(count: int) -> str:
     return "1 run" if count == 1 else f"{count} runs"
 
 
-def _parts(data: Campaign) -> Iterator[_Part]:
-    """Every comparison, with what it is about."""
+def _who(data: Campaign, part: Followed, run: int) -> str:
+    """Which run it was; `--replay` shows a random one."""
     seed = f"seed {data.seed}"
-    for own in data.loops:
-        what = f"uncertainty {data.uncertainty}"
-        yield _Part(loop=own.loop, comparison=own.comparison, word="one", what=what)
-    for attack in data.attacks:
-        random, worst = attack.random, attack.adversary
-        yield _Part(
-            loop=attack.loop,
-            comparison=random.comparison,
-            word="random",
-            what=seed,
-            each="random run",
-            asked=attack.asked,
-        )
-        if worst is not None:
-            found, what = worst.comparison, f"adversary, {seed}"
-            yield _Part(loop=attack.loop, comparison=found, word="adversary", what=what)
-    if (members := data.members) is not None:
-        what, each = f"{members.runs_each} along each, {seed}", "random plans, run"
-        for along in members.loops:
-            found = along.comparison
-            yield _Part(loop=along.loop, comparison=found, word="other plans", what=what, each=each)
+    match part.kind:
+        case "one":
+            return f"uncertainty {data.uncertainty}"
+        case "random":
+            return f"random run {run}, {seed}"
+        case "other plans" if data.members is not None:
+            return f"random plans, run {run}, {data.members.runs_each} along each, {seed}"
+    return f"adversary, {seed}"
 
 
-def _sections(data: Campaign, parts: list[_Part]) -> Iterator[tuple[str, str, Iterator[Block]]]:
-    broken = [_violation(part, item) for part in parts for item in part.comparison.violations]
-    yield "runs", "Runs", _first(data, parts, broken[:_FIRST])
+def _sections(data: Campaign) -> Iterator[tuple[str, str, Iterator[Block]]]:
+    parts = data.followed
+    broken = [_violation(data, part, item) for part in parts for item in part.comparison.violations]
+    yield "runs", "Runs", _first(data, broken[:_FIRST])
     yield "broken", "Everything that broke", iter(broken[_FIRST:] and broken)
     yield "bounds", "Largest share of every bound", _bounds(parts)
     yield "inputs", "Inputs, in all runs", _inputs(parts)
     yield "acted", "What acted on the loops", _about(data)
 
 
-def _first(data: Campaign, parts: list[_Part], broken: list[Reason]) -> Iterator[Block]:
+def _first(data: Campaign, broken: list[Reason]) -> Iterator[Block]:
     yield from broken
-    for part in parts:
-        yield from (Words(text=_stopped(part, item)) for item in part.comparison.stopped[:_LISTED])
-        yield from (Words(text=_unresolved(part, item)) for item in part.comparison.unresolved[:_LISTED])
+    for part in data.followed:
+        yield from (Words(text=_stopped(data, part, item)) for item in part.comparison.stopped[:_LISTED])
+        yield from (
+            Words(text=_unresolved(data, part, item)) for item in part.comparison.unresolved[:_LISTED]
+        )
     columns = ("loop", "runs", ">number", ">left", ">no result", ">max d/bound", "at", "settled")
-    yield Table.of(columns, map(_row, parts))
+    yield Table.of(columns, map(_row, data.followed))
     loops = {each.loop.controller: _gains(each.loop) for each in data.loops}
     yield Facts.of(loops.items(), tuple(loops))
     if data.setting.spec.obstacles:
         yield _obstacles(data)
 
 
-def _violation(part: _Part, item: Violation) -> Reason:
+def _violation(data: Campaign, part: Followed, item: Violation) -> Reason:
     return Reason(
         verdict="falsified",
         claim=f"{part.loop.controller}, {_WORDS.get(item.of, item.of)}",
-        message=told(item, part.run(item)),
+        message=told(item, _who(data, part, item.run)),
         relax=f"to see it alone: the same command with --replay {item.run}" if part.asked else "",
     )
 
@@ -152,24 +119,24 @@ def told(item: Violation, who: str) -> str:
     return f"{short(item.value, 6)}, proven at most {up(item.bound, 6)}; {when}{who}"
 
 
-def _stopped(part: _Part, item: Stopped) -> str:
-    return f"{part.loop.controller}: {item.reason} at t = {short(item.t)} s, {part.run(item)}"
+def _stopped(data: Campaign, part: Followed, item: Stopped) -> str:
+    return f"{part.loop.controller}: {item.reason} at t = {short(item.t)} s, {_who(data, part, item.run)}"
 
 
-def _unresolved(part: _Part, item: RunAt) -> str:
+def _unresolved(data: Campaign, part: Followed, item: RunAt) -> str:
     since = UNKNOWN if item.t is None else f"{short(item.t)} s"
     return (
         f"{part.loop.controller}: no result from t = {since} on, where the run depends on the steps of the "
-        f"integration: the loop is unstable, or too fast to be followed; {part.run(item)}"
+        f"integration: the loop is unstable, or too fast to be followed; {_who(data, part, item.run)}"
     )
 
 
-def _row(part: _Part) -> tuple[str, ...]:
+def _row(part: Followed) -> tuple[str, ...]:
     found, use = part.comparison, part.comparison.worst.get("distance")
     share, at = (UNKNOWN, "") if use is None or use.share is None else (short(use.share), f"{short(use.t)} s")
     return (
         part.loop.controller,
-        part.word,
+        part.kind,
         str(found.runs) + (f" of {part.asked}" if found.runs < part.asked else ""),
         str(found.left_the_tube),
         str(found.no_result),
@@ -197,12 +164,12 @@ def clearance(item: Clearance) -> str:
     return f"collides, {value} at {short(item.t)} s" if item.collides else value
 
 
-def _bounds(parts: list[_Part]) -> Iterator[Block]:
+def _bounds(parts: list[Followed]) -> Iterator[Block]:
     """What the loops that adapt used of every bound, over all their runs."""
     most: dict[str, dict[str, float]] = {}
     for part in parts:
-        shares = most.setdefault(part.loop.controller, {}) if part.counts else {}
-        for name, use in part.comparison.worst.items():
+        for name, use in part.comparison.worst.items() if part.loop.adapts else ():
+            shares = most.setdefault(part.loop.controller, {})
             if use.share is not None:
                 shares[name] = max(shares.get(name, 0.0), use.share)
     names = [name for name in _WORDS if any(name in shares for shares in most.values())]
@@ -211,7 +178,7 @@ def _bounds(parts: list[_Part]) -> Iterator[Block]:
         yield Table.of(("loop", *(f">{_WORDS[name]}" for name in names)), rows)
 
 
-def _inputs(parts: list[_Part]) -> Iterator[Block]:
+def _inputs(parts: list[Followed]) -> Iterator[Block]:
     """How far every input with limits went over all runs of a loop."""
     found: dict[tuple[str, str], Went] = {}
     for part in parts:

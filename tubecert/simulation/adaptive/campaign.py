@@ -39,26 +39,29 @@ RANDOM: Final = "of random run {run}, seed {seed}"
 _HERE: Final = Serial()
 _WAVES: Final = ("amplitude", "frequency", "wave", "phase", "push")
 _BESIDE: Final = ("wind", "aim", "blowing", "gusting", "theta")
+Kind = Literal["one", "random", "adversary", "other plans"]
 Outcome = Literal["falsified", "tube left", "no result", "interrupted", "not falsified", "nothing claimed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Followed:
-    """Runs of a loop, and what they came to.
+    """Runs of a loop, and what they came to: `one` that is drawn, `random` runs, of which so many were `asked` for, ...
 
     Of one that is drawn how near it came to `obstacles`; of an adversary the `case`: its start, and what acted on it.
     """
 
+    kind: Kind
     loop: Loop
     runs: Runs
     comparison: Comparison
+    asked: int = 0
     obstacles: tuple[Clearance, ...] = ()
     case: Cases | None = None
 
     @classmethod
-    def judged(cls, setting: Setting, loop: Loop, runs: Runs, case: Cases | None = None) -> Followed:
+    def judged(cls, setting: Setting, kind: Kind, loop: Loop, runs: Runs) -> Followed:
         """Runs beside what is promised of their loop."""
-        return cls(loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise), case=case)
+        return cls(kind=kind, loop=loop, runs=runs, comparison=compare(setting, runs, loop.promise))
 
     @property
     def data(self) -> dict[str, object]:
@@ -68,10 +71,9 @@ class Followed:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Attack:
-    """What random runs, of which so many were `asked` for, and the adversary found against a loop."""
+    """What random runs and the adversary found against a loop."""
 
     random: Followed
-    asked: int
     adversary: Followed | None = None
 
     @property
@@ -116,10 +118,15 @@ class Campaign:
     members: Members | None = None
 
     @property
+    def followed(self) -> list[Followed]:
+        """All runs of all loops."""
+        attacks = [own for attack in self.attacks for own in (attack.random, attack.adversary) if own]
+        return [*self.loops, *attacks, *(self.members.loops if self.members else ())]
+
+    @property
     def outcome(self) -> Outcome:
         """What all runs came to; a loop that is not meant to stay in the tube has no say but by a broken promise."""
-        found = [*self.loops, *(self.members.loops if self.members else ())]
-        found += [own for attack in self.attacks for own in (attack.random, attack.adversary) if own]
+        found = self.followed
         tested = [own.comparison for own in found if own.loop.adapts]
         if any(own.comparison.violations for own in found):
             return "falsified"
@@ -158,7 +165,7 @@ def _attack_data(attack: Attack, setting: Setting) -> dict[str, object]:
     found, most = attack.adversary, attack.greatest
     data = attack.loop.data | {
         "largest_distance_over_dbar": None if most is None else most / setting.reach,
-        "random": {"asked": attack.asked, **to_json(attack.random.comparison)},
+        "random": {"asked": attack.random.asked, **to_json(attack.random.comparison)},
     }
     if found is not None and found.case is not None:
         start, h = found.case
@@ -192,7 +199,7 @@ def simulate(
     work = partial(_vector, setting, loops, own, seed)
     found = finished(work, vectors, executor, report, "loops and random runs")
     parts, complete = [runs[len(runs) - len(tested) :] for runs in found], len(found) == len(vectors)
-    drawn = [Followed.judged(setting, loop, runs) for loop, runs in zip(loops, found[0], strict=False)]
+    drawn = [Followed.judged(setting, "one", *each) for each in zip(loops, found[0], strict=False)]
     if setting.h is not None and replay is None:
         where = "simulation.h" if setting.spec.simulation and setting.spec.simulation.h else "uncertainty.h"
         for item in drawn:
@@ -200,7 +207,7 @@ def simulate(
     lost = [item.loop for item in drawn if item.comparison.no_result]
     attacks = []
     for loop, *sample in zip(tested, *parts, strict=True):
-        attack = Attack(random=Followed.judged(setting, loop, joined(sample)), asked=count)
+        attack = Attack(random=replace(Followed.judged(setting, "random", loop, joined(sample)), asked=count))
         if complete and loop not in lost:
             with suppress(KeyboardInterrupt):
                 attack = replace(attack, adversary=_adversary(setting, attack.random, seed, report))
@@ -236,7 +243,7 @@ def _adversary(setting: Setting, random: Followed, seed: int, report: Progress |
     """The worst run that a search finds."""
     found = worst(setting, random.loop, seed, random.runs, report)
     (runs,) = integrate([(random.loop, found)], tolerance=setting.tolerance)
-    return Followed.judged(setting, random.loop, runs, found)
+    return replace(Followed.judged(setting, "adversary", random.loop, runs), case=found)
 
 
 def follow(
@@ -270,7 +277,8 @@ def follow(
         runs_each=each,
         largest_defect=max(defects),
         loops=tuple(
-            Followed.judged(setting, loop, joined(parts)) for loop, *parts in zip(tested, *found, strict=True)
+            Followed.judged(setting, "other plans", loop, joined(parts))
+            for loop, *parts in zip(tested, *found, strict=True)
         ),
     )
 
