@@ -17,7 +17,7 @@ from tubecert.bounds.constants import Constant
 from tubecert.bounds.suprema import Suprema
 from tubecert.enclosure.constant import decimal_above, printable_above
 from tubecert.enclosure.interval import Interval, sqrt
-from tubecert.tube import Containment, containment
+from tubecert.tube import containment
 from tubecert.verdict import Verdict
 
 _ROUNDS = 20
@@ -71,14 +71,14 @@ def greatest_level(
     """The greatest rho, but for a thousandth, for which no half-width exceeds the one that was asked for, theory 1a.5.
 
     `asked` of every state, then of every output of the model. Where the safe set has less room than that, a smaller
-    one; none if it is a half-width that is asked for which does not fit.
+    one.
     """
     now, best = proposed, None
     found = Radius(rho=now.rho)
     for k in range(_ROUNDS):
         found = settled(suprema, safe_set, now)
         if found.lower is None or found.sides is None:
-            share = None if best is not None else _narrower(suprema.model.states, found, asked)
+            share = None if best is not None else _narrower(suprema.model.states, found)
             if share is None or found.sides is None:
                 return best or found
             now = Proposed(rho=found.rho, sides=found.sides).scaled(share * (1 - _added(k)))
@@ -94,23 +94,12 @@ def greatest_level(
     return best or replace(found, lower=None, upper=None, obstacle="not_settled")
 
 
-def _narrower(states: Sequence[str], found: Radius, asked: Sequence[Fraction | None]) -> Fraction | None:
-    """By what factor a tube that leaves the safe set has to shrink; None if it may not, or that would not help."""
+def _narrower(states: Sequence[str], found: Radius) -> Fraction | None:
+    """By what factor a tube that leaves the safe set has to shrink; None if that would not help."""
     contained = found.contained
     if contained.verdict is Verdict.CERTIFIED or found.sides is None or contained.room <= 0:
         return None
-    i = states.index(contained.state)
-    return None if too_wide(found.sides[i], contained, asked[i]) else contained.room / found.sides[i]
-
-
-def too_wide(side: Fraction, contained: Containment, asked: Fraction | None) -> Fraction | None:
-    """By how much the half-width `asked` does not fit, where a tube that is `side` wide leaves; None if it fits."""
-    if (
-        asked is None or contained.verdict is not Verdict.REFUTED
-    ):  # else `excess` may stand for what is not known
-        return None
-    beyond = contained.excess + asked - side
-    return beyond if beyond > 0 else None
+    return contained.room / found.sides[states.index(contained.state)]
 
 
 def settled(suprema: Suprema, safe_set: Box, proposed: Proposed) -> Radius:

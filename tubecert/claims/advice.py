@@ -84,16 +84,12 @@ EnlargeSafeSet = _advice("EnlargeSafeSet", "enlarge the safe set")
 
 
 class FitTube(Relax):
-    """A tube that fits into the safe set: a half-width of `state`, or without one the radii, of `most` in all."""
+    """A tube that fits into the safe set: radii of `most` in all."""
 
     most: float
-    state: str | None = None
 
     def _told(self) -> str:
-        asked = (
-            "epsilon + rho_a and what the start takes" if self.state is None else f"half_widths.{self.state}"
-        )
-        return f"{asked} of at most {down(self.most, 4)} would fit"
+        return f"epsilon + rho_a and what the start takes of at most {down(self.most, 4)} would fit"
 
 
 class MeasureTube(Relax):

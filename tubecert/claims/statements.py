@@ -155,20 +155,6 @@ class PlanInSafeSet(Claim):
         return f"the plan itself leaves the safe set through {by}{reason.when}"
 
 
-class HalfWidthFits(Claim):
-    """The safe set has room for a half-width; that of `state` exceeds what the plan leaves on `side` by `excess`."""
-
-    name = "the half-widths fit into the safe set"
-    state: str
-    side: Side
-    half_width: Fraction
-    excess: float
-
-    def _why(self, reason: Reason) -> str:
-        room = f"the plan leaves to the {self.side} bound of {self.state} in the safe set{reason.when}"
-        return f"half_widths.{self.state} is {near(self.half_width)}, {near(self.excess, 3)} more than {room}"
-
-
 class StartInTube(Claim):
     """The start lies in the tube; in `state` it is `off` from the plan's, and `half_width` is asked for."""
 

@@ -89,9 +89,10 @@ def _too_wide(spec: Spec, t: Array, x: Array, sides: Array, radius: str) -> Iter
         else f"the tube reaches {name}* +-{near(side, 4)}"
     )
     message = f"{reaches}, but{when} the plan is only {near(room, 4)} from the {name} side of the safe set"
-    help = f"half_widths.{name} of at most {near(room, 4)} fits; or enlarge the safe set" if asked else _LESS
+    help = f"certify proves a tube of at most {near(room, 4)} there; ask for that" if asked else _LESS
     path = (asked or "tube") if spec.location(asked or "tube") else "safe_set"
-    yield finding(spec, codes.NO_ROOM, path, message, help, severity=Severity.ERROR)
+    severity = Severity.WARNING if asked else Severity.ERROR  # half-widths are made to fit
+    yield finding(spec, codes.NO_ROOM, path, message, help, severity=severity)
 
 
 def _outside(spec: Spec, offset: Array, sides: Array) -> Finding:

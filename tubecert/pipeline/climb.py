@@ -16,7 +16,7 @@ from math import inf, log2, sqrt
 import numpy as np
 
 from tubecert.certificate.result import RateLimit, RateLimits
-from tubecert.claims.statements import HalfWidthFits, TubeInSafeSet, TubeRadius
+from tubecert.claims.statements import TubeInSafeSet, TubeRadius
 from tubecert.enclosure.constant import round_down
 from tubecert.enclosure.tape import Tape
 from tubecert.model import ControlAffineModel
@@ -226,4 +226,4 @@ def _rounder(row: Row, above: Row | None) -> bool:
 
 def _overshoots(row: Row) -> bool:
     """Whether the certification ended at the size of the tube."""
-    return isinstance(row.claim, HalfWidthFits | TubeInSafeSet | TubeRadius)
+    return isinstance(row.claim, TubeInSafeSet | TubeRadius)

@@ -14,7 +14,6 @@ from math import inf
 from tubecert.claims.advice import (
     AskForRateBelow,
     EnlargeSafeSet,
-    FitTube,
     GiveInput,
     LowerRate,
     MeasureTube,
@@ -33,7 +32,7 @@ from tubecert.claims.failures import (
     RankUnproven,
 )
 from tubecert.claims.family import Reason, Relax
-from tubecert.claims.statements import HalfWidthFits, MetricFound, TubeInSafeSet
+from tubecert.claims.statements import MetricFound, TubeInSafeSet
 from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.constant import Witness, round_down
@@ -348,14 +347,8 @@ class SynthesisRun:
             return self._failed(failure, *sorted(mends, key=lambda mend: mend.share)[:1])
         if (tube := self._other_tube()) is not None:
             return self._failed(failure, tube)
-        match failure.slow:
-            case HalfWidthFits(state=state, half_width=width, excess=excess):
-                return self._failed(
-                    failure, FitTube(state=state, most=float(width) - excess), EnlargeSafeSet()
-                )
-            case TubeInSafeSet():
-                return self._failed(failure, ReduceRadii(), EnlargeSafeSet())
-        return self._failed(failure)
+        small = isinstance(failure.slow, TubeInSafeSet)
+        return self._failed(failure, *((ReduceRadii(), EnlargeSafeSet()) if small else ()))
 
     def _other_tube(self) -> MeasureTube | None:
         """A tube that certifies with one of the metrics, where radii measure states that are unlike."""

@@ -112,10 +112,6 @@ _CLAIMS: Mapping[str, Form] = {
         {},
     ),
     "plan_in_safe_set": ({"state": Node.text, "side": _SIDE, "excess": Node.number}, {}),
-    "half_width_fits": (
-        {"state": Node.text, "side": _SIDE, "half_width": Node.decimal, "excess": Node.number},
-        {},
-    ),
     "start_in_tube": ({"state": Node.text, "off": Node.number, "half_width": Node.decimal}, {}),
     "constant_bounded": ({"constant": Node.text}, {}),
     "uncertainty_bound": ({"constant": Node.text, "declared": Node.number, "reaches": maybe}, {}),

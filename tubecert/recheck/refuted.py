@@ -227,14 +227,6 @@ def _beyond(told: _Told, radius: Fraction, least: Fraction) -> Outcome:
     return CONFIRMED
 
 
-def _too_wide(told: _Told) -> Outcome:
-    """The half-width that is asked for is more than the plan leaves to a face of the safe set, at a time."""
-    asked = told.case.result.specification.half_widths
-    width = asked[told.word("state", *asked)]
-    told.same("half_width", width)
-    return _beyond(told, width, width)
-
-
 def _starts_outside(told: _Told) -> Outcome:
     """A state starts farther from the plan's than the half-width that is asked for."""
     s, asked, off = told.case.system, told.case.result.specification.half_widths, told.parameters["off"]
@@ -281,7 +273,6 @@ _FALSE: Mapping[str, Callable[[_Told], Outcome]] = {
     "metric_bound": _beyond_declared,
     "tube_in_safe_set": _leaves,
     "plan_in_safe_set": _leaves,
-    "half_width_fits": _too_wide,
     "start_in_tube": _starts_outside,
     "input_within_limits": _plan_exceeds,
 }

@@ -12,7 +12,7 @@ import numpy as np
 
 from tubecert.bounds.compute import Radius, least_radius
 from tubecert.bounds.constants import Witness
-from tubecert.bounds.level import Proposed, greatest_level, least_level, too_wide
+from tubecert.bounds.level import Proposed, greatest_level, least_level
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate.sections import declared_metric
 from tubecert.claims.advice import (
@@ -24,7 +24,6 @@ from tubecert.claims.advice import (
 )
 from tubecert.claims.family import Claim, Relax, Side
 from tubecert.claims.statements import (
-    HalfWidthFits,
     PlanBounded,
     PlanInSafeSet,
     StartInTube,
@@ -212,42 +211,37 @@ def _radii(
 
 def _leaving(planned: Planned, radius: Radius) -> Stopped:
     """What is claimed of a tube that is not proven to lie in the safe set, and what would fit."""
-    question, contained = planned.question, radius.contained
-    claim, verdict, x = _claim(radius), contained.verdict, contained.x
-    relax: tuple[Relax, ...] = (EnlargeSafeSet(),)
-    if contained.state and not contained.outside:
-        i, asked = question.spec.states.index(contained.state), asked_half_widths(question)
-        side = radius.rho if radius.sides is None else radius.sides[i]
-        width = None if asked is None else asked[i]
-        if contained.room > 0 and (asked is None or width is not None):
-            own = float(contained.room) * (float(radius.rho / side) if width is None else 1.0)
-            relax = (FitTube(most=own, state=None if width is None else contained.state), *relax)
-        beyond = None if radius.sides is None else too_wide(side, contained, width)
-        if width is not None and beyond is not None:
-            claim = HalfWidthFits(
-                state=contained.state, side=_side(contained), half_width=width, excess=float(beyond)
-            )
-            away = float(width - side) * (1 if claim.side == "upper" else -1)
-            verdict, x = Verdict.REFUTED, (*x[:i], x[i] + away, *x[i + 1 :])
-        elif (
-            radius.sides is not None
-        ):  # what no file says: bounds of what this tube reaches, and it is one of many
-            verdict = Verdict.UNDECIDED
-    return stopped(planned, claim, verdict, where=Witness(t=contained.t, x=x), relax=relax, partial=radius)
+    contained = radius.contained
+    # in coordinates of its own a tube is bounds of what it reaches, and one of many: that it leaves refutes nothing
+    refutes = radius.sides is None or contained.outside
+    return stopped(
+        planned,
+        _claim(radius),
+        contained.verdict if refutes else Verdict.UNDECIDED,
+        where=Witness(t=contained.t, x=contained.x),
+        relax=(*_fitting(planned.question, radius), EnlargeSafeSet()),
+        partial=radius,
+    )
+
+
+def _fitting(question: Question, radius: Radius) -> tuple[Relax, ...]:
+    """The radii that would fit where the plan has room; half-widths are made to fit."""
+    contained = radius.contained
+    if not contained.state or contained.outside or contained.room <= 0 or question.spec.tube.half_widths:
+        return ()
+    side = radius.rho if radius.sides is None else radius.sides[question.spec.states.index(contained.state)]
+    return (FitTube(most=float(contained.room) * float(radius.rho / side)),)
 
 
 def _claim(radius: Radius) -> Claim:
     contained = radius.contained
     if not contained.state:
         return PlanBounded()
-    side, excess = _side(contained), float(contained.excess)
+    side: Side = "upper" if contained.side == "upper" else "lower"
+    excess = float(contained.excess)
     if contained.outside:
         return PlanInSafeSet(state=contained.state, side=side, excess=excess)
     return TubeInSafeSet(radius=radius.rho, state=contained.state, side=side, excess=excess)
-
-
-def _side(contained: Containment) -> Side:
-    return "upper" if contained.side == "upper" else "lower"
 
 
 def _start_outside(planned: Planned) -> Stopped | None:
