@@ -81,3 +81,11 @@ def test_an_exact_number_is_not_rounded() -> None:
 def _beside(q: int) -> set[Fraction]:
     with mpmath.workdps(40):
         return {Fraction(q) + s * Fraction(1, 10**k) for s in (-1, 1) for k in range(28, 33)}
+
+
+def test_how_many_digits_a_number_with_pi_has_is_part_of_hashes():
+    """Written down from version 0.2.0; the digits before the point are counted of a fraction."""
+    assert parse_number("37 deg") == Fraction(
+        "645771823237901943461765584341/1000000000000000000000000000000"
+    )
+    assert parse_number("50 deg") == Fraction("218166156499291197115461346061/250000000000000000000000000000")

@@ -14,6 +14,7 @@ from typing import Final, Literal
 
 from tubecert.expression import graph
 from tubecert.expression.balls import BITS, middle, values
+from tubecert.expression.calculus import rebuild
 from tubecert.expression.graph import Expression, topological
 from tubecert.expression.meant import HAS_NONE, UNITS, instead_of
 from tubecert.expression.parse import Parsed, parse
@@ -33,6 +34,9 @@ _ONE_FACTOR = re.compile(
     r"\s*[-+]?\s*(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[A-Za-z]\w*|\([^()]*\))"
     r"(?:\s*[*/]\s*(?:[0-9.]+|[A-Za-z]\w*))*\s*"
 )
+_NEAR_PI: Final = Fraction(
+    3141592653589793238462643383279502884197169399375105820974944592307816406287, 10**75
+)
 _OF_PI: Final = frozenset({"const", "pi", "add", "mul", "div", "pow"})
 
 
@@ -44,7 +48,7 @@ def parse_number(
     With pi it is rounded to `DIGITS` digits, to that side. Raises `ExpressionError`.
     """
     value = parse_constant(text, symbols)
-    return value.fraction if value.is_constant else _rounded(*_ends(value), side)
+    return value.fraction if value.is_constant else _rounded(value, side)
 
 
 def parse_constant(text: str, symbols: Mapping[str, Fraction | Expression] | None = None) -> Expression:
@@ -60,6 +64,7 @@ def parse_constant(text: str, symbols: Mapping[str, Fraction | Expression] | Non
             if low <= 0 and (owed.kind == "positive" or high >= 0):
                 raise ZeroDivisionError
         _ends(found)
+        _nearly(found)
     except (ValueError, ZeroDivisionError):
         help = "write it as a decimal or a fraction, or with pi or deg; numbers here are exact"
         raise _refused(text, f"{word[:60]} is not a rational number", help) from None
@@ -142,9 +147,22 @@ def root_above(square: Fraction) -> Fraction:
     return Fraction(isqrt(scaled.numerator // scaled.denominator) + 1) / Fraction(10) ** places
 
 
-def _rounded(low: Fraction, high: Fraction, side: Side) -> Fraction:
-    """A decimal of `DIGITS` digits at or next to every number of a range."""
-    size = max(abs(low), abs(high))
+def _nearly(e: Expression) -> Fraction:
+    """A number made of rationals and pi with 75 digits of pi; raises `ZeroDivisionError` if it has no value then."""
+    values: dict[Expression, Expression] = {}
+    for node in topological([e]):
+        own = graph.constant(_NEAR_PI) if node.op == "pi" else node
+        values[node] = rebuild(node, tuple(values[each] for each in node.args)) if node.args else own
+    return values[e].fraction
+
+
+def _rounded(e: Expression, side: Side) -> Fraction:
+    """A decimal of `DIGITS` digits at or next to a number with pi.
+
+    How many digits stand before the point is counted of a fraction: of the same one from version to version, or
+    canonical forms and their hashes would change.
+    """
+    size, (low, high) = _nearly(e), _ends(e)
     bits = size.numerator.bit_length() - size.denominator.bit_length()
     places = DIGITS - bits * 30103 // 100000  # log10(2)
     grid = Fraction(10) ** -places
