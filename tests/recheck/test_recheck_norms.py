@@ -6,12 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rechecked
+from flint import ctx
 
 from tubecert.recheck import norms as by_norms
-from tubecert.recheck.cover import Outcome
+from tubecert.recheck.balls import exact
+from tubecert.recheck.cover import BOXES, Outcome
 from tubecert.recheck.curve import expressed
 from tubecert.recheck.norms import column_below, norms
 from tubecert.recheck.place import Place
+from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.terms import number
 
 NAMES = ("x", "y", "t", "m")
@@ -100,3 +103,10 @@ def test_what_is_known_of_a_limit_is_not_believed_of_a_smaller_one(monkeypatch):
     assert not norms(own, matrix, most * Fraction(101, 100)).holds
     assert not norms(place(), matrix, most * Fraction(102, 100)).holds  # of another tube
     assert not norms(own, [[[e] for e in column(*COLUMNS[3])]], most * 2).holds
+
+
+def test_a_bound_is_above_every_corner_that_floats_do_not_tell_apart():
+    """A bound of 1 + (x + y)/2^59 is not that of another corner, which is the same float."""
+    with ctx.workprec(BOXES):
+        bound = NormsBelow([[column("1 + (x + y)/576460752303423488")]], Fraction(0)).bound([(-1.0, 1.0)] * 2)
+        assert bound >= exact(1 + Fraction(1, 2**58))

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from copy import copy
 from fractions import Fraction
+from functools import reduce
 from typing import Self
 
 from flint import arb, arb_mat
@@ -69,7 +70,7 @@ class NormsBelow(_OnField):
         """An upper bound on a box."""
         found, _, _ = self._field.expand(box)
         tops = [self._norms(at) + self._norms(e.rest) for e in found for at in e.vertices()]
-        return max(tops[1:], key=float, default=tops[0]).max(tops[0]).upper() if _finite(tops) else arb("nan")
+        return reduce(arb.max, tops).upper() if _finite(tops) else arb("nan")
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """Whether the columns of the matrices alone are too long at a point."""
