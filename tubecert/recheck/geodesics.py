@@ -124,23 +124,21 @@ class SymbolsBelow:
         n, count = self._n, len(self._moving)
         matrices = [arb_mat(n, n, entries[k : k + n * n]) for k in range(0, len(entries), n * n)]
         try:
-            tensor = self._symbols(matrices[: count + 1]) if not self._order else self._slopes(matrices)
+            M = matrices[0].inv()
         except ZeroDivisionError:
             return arb("nan")
+        D = {i: w * M for i, w in zip(self._moving, matrices[1:], strict=False)}
+        S = {i: M * d for i, d in D.items()}
+        if self._order:
+            tensor = self._slopes(matrices[: count + 1], matrices[count + 1 :], M, D, S)
+        else:
+            tensor = self._assembled(D, self._forms(matrices[0], S))  # Gamma^k_ij as [k, i, j], (5.2)
         unfoldings = ((0,), (2,), (3,), (0, 3), (0, 2)) if self._order else ((0,), (2,))
         norms = [spectral_norm(_unfolded(tensor, rows)) for rows in unfoldings]
         best = norms[0]
         for value in norms[1:]:
             best = best if best <= value else value
         return best
-
-    def _symbols(self, matrices: Sequence[arb_mat]) -> Tensor:
-        """Gamma^k_ij as [k, i, j], (5.2)."""
-        W, first = matrices[0], matrices[1:]
-        M = W.inv()
-        D = {i: w * M for i, w in zip(self._moving, first, strict=True)}
-        S = {i: M * d for i, d in D.items()}
-        return self._assembled(D, self._forms(W, S))
 
     def _forms(self, W: arb_mat, S: dict[int, arb_mat]) -> Tensor:
         """sum_l W_kl (S_l)_ij, a term of (5.2)."""
@@ -157,13 +155,16 @@ class SymbolsBelow:
             for (k, i, j), value in forms.items()
         }
 
-    def _slopes(self, matrices: Sequence[arb_mat]) -> Tensor:
-        """dGamma^k_ij/dx_m as [k, i, j, m], (5.2) differentiated."""
-        count, moving = len(self._moving), self._moving
-        W, first, second = matrices[0], matrices[1 : count + 1], matrices[count + 1 :]
-        M = W.inv()
-        D = {i: w * M for i, w in zip(moving, first, strict=True)}
-        S = {i: M * d for i, d in D.items()}
+    def _slopes(
+        self,
+        values: Sequence[arb_mat],
+        second: Sequence[arb_mat],
+        M: arb_mat,
+        D: dict[int, arb_mat],
+        S: dict[int, arb_mat],
+    ) -> Tensor:
+        """dGamma^k_ij/dx_m as [k, i, j, m], (5.2) differentiated; `values` are W and its slopes."""
+        (W, *first), moving, count = values, self._moving, len(self._moving)
         found: Tensor = {}
         for place, m in enumerate(moving):
             bent = dict(zip(moving, second[place * count : (place + 1) * count], strict=True))
@@ -177,15 +178,7 @@ class SymbolsBelow:
 
 def _unfolded(tensor: Tensor, rows: tuple[int, ...]) -> list[list[Ball]]:
     """The tensor as a matrix, the axes `rows` against all others."""
-    size = [1 + max(key[axis] for key in tensor) for axis in range(len(next(iter(tensor))))]
-    others = tuple(axis for axis in range(len(size)) if axis not in rows)
-    matrix = []
-    for row in product(*(range(size[a]) for a in rows)):
-        line = []
-        for column in product(*(range(size[a]) for a in others)):
-            key = [0] * len(size)
-            for axis, index in zip((*rows, *others), (*row, *column), strict=True):
-                key[axis] = index
-            line.append(tensor[tuple(key)])
-        matrix.append(line)
-    return matrix
+    lines: dict[tuple[int, ...], list[Ball]] = {}
+    for key in sorted(tensor):
+        lines.setdefault(tuple(key[axis] for axis in rows), []).append(tensor[key])
+    return [lines[row] for row in sorted(lines)]

@@ -253,9 +253,7 @@ class LipschitzBelow:
 def _levels(entries: Sequence[Term], fields: Fields) -> list[tuple[Matrix, list[Matrix]]]:
     """For every norm, then for `entries`: the Jacobian with inner norms kept fixed, and the slopes along these."""
     plain, norms = _apart(entries)
-    back = {name: variable(name) for name in norms}
-    for name, (whole, _) in norms.items():
-        back[name] = whole
+    back = {name: whole for name, (whole, _) in norms.items()}
     found: list[tuple[Matrix, list[Matrix]]] = []
     earlier: list[str] = []
     for own in [*(args for _, args in norms.values()), plain]:

@@ -212,8 +212,8 @@ def straight_below(place: Place, column: Sequence[Term], limit: Fraction) -> Out
     centre = [number_of(e) for e in start]
     rim = list(_rim(place, [float(q) for q in centre]))
     g, K = _proposed(column, states, centre, rim)
-    inverse = _inverse(place)
-    H = [[exact(_dot(row, along)) for along in zip(*inverse, strict=True)] for row in K]
+    straight_in_z = place.fields.covector([[number(k) for k in row] for row in K])
+    H = [[exact(number_of(e)) for e in row] for row in straight_in_z]
     left = exact(limit) - length([exact(q) for q in g]) - exact(place.rho) * sharp_norm(H)
     if not left > 0:
         return None
@@ -237,9 +237,7 @@ def straight_below(place: Place, column: Sequence[Term], limit: Fraction) -> Out
 def _rim(place: Place, centre: Sequence[float]) -> Iterator[list[float]]:
     """For every state the point where it is largest, then the one where it is least: x* and those, in turns."""
     n = len(centre)
-    spread = [[float(i == j) for j in range(n)] for i in range(n)]
-    if place.coordinates is not None:
-        spread = [[float(q) for q in row] for row in place.coordinates.spread]
+    spread = [[float(number_of(e)) for e in row] for row in place.fields.unit]
     for j in range(n):
         far = [float(place.rho) * spread[i][j] / math.sqrt(spread[j][j]) for i in range(n)]
         for share in _CHORDS:
@@ -251,7 +249,7 @@ def _proposed(
     column: Sequence[Term], states: Sequence[str], centre: Sequence[Fraction], rim: Sequence[Sequence[float]]
 ) -> tuple[list[Fraction], list[list[Fraction]]]:
     """G at the centre, and in column j of K the mean of its slopes by x_j where x_j changes most."""
-    n, each = len(states), 2 * len(_CHORDS)
+    each = 2 * len(_CHORDS)
     g = [_short(x) for x in Program(list(column), states).run([exact(q) for q in centre])]
     columns = []
     for j, name in enumerate(states):
@@ -260,7 +258,6 @@ def _proposed(
         columns.append(
             [sum((_short(x) for x in own), Fraction(0)) / each for own in zip(*found, strict=True)]
         )
-    assert len(columns) == n
     return g, [list(row) for row in zip(*columns, strict=True)]
 
 
@@ -278,18 +275,6 @@ def _shared(
     size = math.sqrt(float(sum(q * q for q in asked)))
     factor = Fraction(float(room) / size) * _KEPT if size > 0 else Fraction(1)
     return [q * factor for q in asked] if factor >= 1 else None
-
-
-def _inverse(place: Place) -> Sequence[Sequence[Fraction]]:
-    """S^-1."""
-    if place.coordinates is not None:
-        return place.coordinates.inverse
-    n = range(len(place.system.states))
-    return [[Fraction(i == j) for j in n] for i in n]
-
-
-def _dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
-    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
 
 
 def _short(value: arb) -> Fraction:
