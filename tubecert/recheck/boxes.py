@@ -25,13 +25,13 @@ from typing import Protocol, TypeAlias
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.balls import Ball, between
+from tubecert.recheck.balls import Ball, between, column
 from tubecert.recheck.lookup import smooth_on
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import (
-    NOUGHT,
     Term,
+    all_zero,
     function,
     in_order,
     looked_up,
@@ -170,7 +170,7 @@ class Field:
         first = {v: slopes(entries, v) for v in self.variables} if self._order else {}
         # of tables alone: how entries depend on other variables is not touched by their knots
         self._steady = self._order == 2 or (self._order == 1 and not kinks)
-        pure = [v for v in self.variables if self._steady and _all_nought(slopes(first[v], v))]
+        pure = [v for v in self.variables if self._steady and all_zero([slopes(first[v], v)])]
         self._affine = [self.variables.index(v) for v in pure[:_CORNERS]]
         self._curved = [i for i in range(len(self.variables)) if i not in self._affine]
         curved = [self.variables[i] for i in self._curved]
@@ -179,7 +179,7 @@ class Field:
             (a, b): slopes(first[curved[a]], curved[b])
             for a, b in combinations_with_replacement(range(count), 2)
         }
-        self._pairs = [pair for pair, e in bent.items() if not _all_nought(e)]
+        self._pairs = [pair for pair, e in bent.items() if not all_zero([e])]
         second = [e for pair in self._pairs for e in bent[pair]]
         own = [e for v in curved for e in first.get(v, ())]
         self._program = Program(entries, inputs)
@@ -187,7 +187,7 @@ class Field:
         self._triples: list[tuple[int, int, int]] = []
         if self._order == 2 and count <= _TURNING and not kinked:
             turning = {(a, b, c): slopes(e, curved[c]) for (a, b), e in bent.items() for c in range(b, count)}
-            self._order, self._triples = 3, [key for key, e in turning.items() if not _all_nought(e)]
+            self._order, self._triples = 3, [key for key, e in turning.items() if not all_zero([e])]
             whole = [e for key in self._triples for e in turning[key]]
         else:
             whole = second if self._order == 2 else own
@@ -249,7 +249,7 @@ class Field:
         if not self._order:
             sides = [program.run([*whole, *self.values.values()]) for program in self._sides]
             values = sides or [self.at(whole)]
-            return [Expansion(_column(value), [], {}, {}, [arb(0)] * len(value)) for value in values], [], []
+            return [Expansion(column(value), [], {}, {}, [arb(0)] * len(value)) for value in values], [], []
         points, ranges = [], []
         for ends in product((0, 1), repeat=len(self._affine)):
             point, range_ = list(mid), list(whole)
@@ -279,7 +279,7 @@ class Field:
         caused, spread = steering
         count, curved, second = len(self._entries), len(self._curved), self._order >= 2
         own, varied = _parts(at, count), _parts(over, count)
-        value, rest = _column(own[0]), [arb(0)] * count
+        value, rest = column(own[0]), [arb(0)] * count
         steps: list[arb_mat] = []
         for a, slope in enumerate(own[1 : 1 + curved] if second else varied):
             i = self._curved[a]
@@ -287,7 +287,7 @@ class Field:
             size = _weighed(weights, map(arb.abs_upper, step))
             spread[i] = max(spread[i], size)
             if self._steady and a < _CORNERS:
-                steps.append(_column(step))
+                steps.append(column(step))
                 if not second:  # the slope of a mean value form is a range
                     caused[i] += _weighed(weights, (s.rad() for s in step))
             else:
@@ -299,7 +299,7 @@ class Field:
         for (a, b), bent in zip(self._pairs, own[1 + curved :], strict=True):
             weight = self._weight((a, b), radius)
             bends = [weight * x for x in bent]
-            bend, near = [q.abs_upper() for q in bends], _column(bends)
+            bend, near = [q.abs_upper() for q in bends], column(bends)
             share: float = 1  # of what bends at the centre: it goes into the rest
             if a == b and a < len(steps) and 2 * vertices <= _VERTICES:
                 squares[a], share = near, 0
@@ -380,11 +380,3 @@ def _weighed(weights: Sequence[float], entries: Iterable[Ball]) -> float:
 
 def _parts(entries: list[Ball], count: int) -> list[list[Ball]]:
     return [entries[k : k + count] for k in range(0, len(entries), count)]
-
-
-def _all_nought(entries: Sequence[Term]) -> bool:
-    return all(e is NOUGHT for e in entries)
-
-
-def _column(entries: list[Ball]) -> arb_mat:
-    return arb_mat(len(entries), 1, entries)

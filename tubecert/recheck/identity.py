@@ -22,7 +22,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
-from tubecert.recheck.monomials import Monomial, expanded
+from tubecert.recheck.monomials import Monomial, Polynomial, expanded, exponent_of
 from tubecert.recheck.terms import NOUGHT, UNIT, Term, function, in_order, number, operation, remade
 
 _WAVES = ("sin", "cos", "tan")
@@ -126,7 +126,6 @@ def _common(p: Fraction, q: Fraction) -> Fraction:
 _INDETERMINATES = frozenset(
     {"symbol", "pi", "asin", "acos", "atan", "exp", "log", "sqrt", "table", "norm", "direction"}
 )
-Polynomial = Any  # fmpq_mpoly: flint's classes carry no types
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +190,7 @@ class _Field:
                 a, b = args
                 return self._reduced(a.top * b.bottom, a.bottom * b.top)
             case "pow":
-                return self._power(args[0], int(str(term.value)))
+                return self._power(args[0], exponent_of(term))
             case "sin" | "cos" | "tan":
                 sine, cosine = self._wave(args[0])
                 if term.op == "tan":

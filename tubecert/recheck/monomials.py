@@ -158,7 +158,7 @@ def degree(outputs: Sequence[Term]) -> float:
 
 def _factor(term: Term) -> Term | None:
     """What a term contributes as a factor: itself, one over the base of its divisor, or nothing."""
-    if term.op in ("const", "add", "mul") or (term.op == "pow" and _exponent(term) > 0):
+    if term.op in ("const", "add", "mul") or (term.op == "pow" and exponent_of(term) > 0):
         return None
     return UNIT / _divisor(term)[0] if term.op in ("div", "pow") else term
 
@@ -168,13 +168,14 @@ def _divisor(term: Term) -> tuple[Term, int]:
     divisor = term.args[1] if term.op == "div" else term
     if divisor.op != "pow":
         return divisor, 1
-    n = _exponent(divisor)
+    n = exponent_of(divisor)
     if term.op == "pow":
         return term.args[0], -n
     return (divisor.args[0], n) if n > 0 else (divisor, 1)
 
 
-def _exponent(term: Term) -> int:
+def exponent_of(term: Term) -> int:
+    """The exponent of a power."""
     return int(str(term.value))
 
 
@@ -196,7 +197,7 @@ def _polynomial(term: Term, args: list[Polynomial], factor: Polynomial, ring: An
             found = factor ** _divisor(term)[1]
         case "pow":
             found = ring.constant(1)
-            for _ in range(_exponent(term)):
+            for _ in range(exponent_of(term)):
                 if len(found) * len(args[0]) > _LARGE:
                     return None
                 found = found * args[0]

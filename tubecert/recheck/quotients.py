@@ -13,7 +13,7 @@ from fractions import Fraction
 
 from flint import fmpq
 
-from tubecert.recheck.monomials import Polynomial, ring_of
+from tubecert.recheck.monomials import Polynomial, exponent_of, ring_of
 from tubecert.recheck.terms import NOUGHT, UNIT, Term, in_order, number, number_of
 
 _LARGE = 400  # terms of a polynomial
@@ -51,11 +51,7 @@ def cancelled(entries: Sequence[Term]) -> list[Term]:
 
 
 def _divides(term: Term) -> bool:
-    return term.op == "div" or (term.op == "pow" and _exponent(term) < 0)
-
-
-def _exponent(term: Term) -> int:
-    return int(str(term.value))
+    return term.op == "div" or (term.op == "pow" and exponent_of(term) < 0)
 
 
 class _Cancelling:
@@ -98,7 +94,7 @@ class _Cancelling:
             case "div":
                 return self._product(args[0], self._inverse(args[1]))
             case "pow":
-                return self._power(args[0], _exponent(term))
+                return self._power(args[0], exponent_of(term))
         return _Quotient(atom, {})
 
     def _sum(self, a: _Quotient, b: _Quotient) -> _Quotient:
