@@ -136,10 +136,13 @@ def slopes_below(h: Rows, name: str, limit: Fraction, beside: Sequence[Rows] = (
 class BranchesBelow:
     """sum_k |G_k(x)| <= limit for every choice of signs that the box admits."""
 
-    def __init__(self, matrices: Sequence[Rows], signs: Signs, limit: Fraction) -> None:
+    def __init__(
+        self, matrices: Sequence[Rows], signs: Signs, limit: Fraction, beside: Iterable[str] = ()
+    ) -> None:
+        """`beside`: further variables."""
         self._signs = signs
         self._test = NormsBelow(matrices, limit, signs.values((1,) * len(signs.names)))
-        self.variables = tuple(sorted({*self._test.variables, *signs.variables}))
+        self.variables = tuple(sorted({*self._test.variables, *signs.variables, *beside}))
         self._columns = [self.variables.index(v) for v in self._test.variables]
         self._signed = [self.variables.index(v) for v in signs.variables]
 
@@ -149,15 +152,22 @@ class BranchesBelow:
         for values in self._signs.over([box[i] for i in self._signed]):
             part = self._signs.part(self._test.variables, own, values)
             found = self._test.with_values(values).over(part)
-            if not found.proven and not found.caused:
-                return Found(False)
-            if not found.proven:
-                wide = [hi - lo for lo, hi in box]
-                caused, spread = list(wide), list(wide)
-                for c, i in enumerate(self._columns):
-                    caused[i], spread[i] = found.caused[c], found.spread[c]
-                return Found(False, caused, spread)
+            if not found.proven and not self._otherwise(box, values):
+                return self._widened(found, box) if found.caused else Found(False)
         return Found(True)
+
+    def _otherwise(self, box: Box, signs: Values) -> bool:
+        """Whether a branch is proven in another way."""
+        del box, signs
+        return False
+
+    def _widened(self, found: Found, box: Box) -> Found:
+        """What to split: what the branch has by what it causes, all else by its width."""
+        wide = [hi - lo for lo, hi in box]
+        caused, spread = list(wide), list(wide)
+        for c, i in enumerate(self._columns):
+            caused[i], spread[i] = found.caused[c], found.spread[c]
+        return Found(False, caused, spread)
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """The branch at a point, where all signs are known."""
@@ -189,38 +199,24 @@ class _Bound:
         return self._test.with_values(signs).bound([box[i] for i in self._columns])
 
 
-class LipschitzBelow:
-    """|h(t, x) - h(t, y)| <= limit |S (x - y)|, branch by branch where there are absolute values."""
+class LipschitzBelow(BranchesBelow):
+    """|h(t, x) - h(t, y)| <= limit |S (x - y)|, branch by branch: the smaller of the two bounds."""
 
     def __init__(self, h: Sequence[Term], fields: Fields, limit: Fraction) -> None:
         self._limit = exact(limit)
-        self._signs = Signs(h)
-        ones = self._signs.values((1,) * len(self._signs.names))
-        entries = self._signs.entries
-        direct = _jacobian(entries, fields)
-        levels = _levels(entries, fields)
+        signs = Signs(h)
+        ones = signs.values((1,) * len(signs.names))
+        direct = _jacobian(signs.entries, fields)
+        levels = _levels(signs.entries, fields)
         every = [direct, *(m for own, gains in levels for m in (own, *gains))]
-        found = names(e for m in every for row in m for e in row) - ones.keys()
-        self.variables = tuple(sorted({*found, *self._signs.variables}))
+        super().__init__([direct], signs, limit, names(_entries(every)) - ones.keys())
         self._levels = [
             (_Bound(own, self.variables, ones), [_Bound(gain, self.variables, ones) for gain in gains])
             for own, gains in (levels if len(levels) > 1 else ())  # one alone is the direct bound
         ]
-        self._direct = NormsBelow([direct], limit, ones)
-        self._columns = [self.variables.index(v) for v in self._direct.variables]
-        self._signed = [self.variables.index(v) for v in self._signs.variables]
 
-    def over(self, box: Box) -> Found:
-        """Every branch that there is on the box: the smaller of the two bounds."""
-        own = [box[i] for i in self._columns]
-        for signs in self._signs.over([box[i] for i in self._signed]):
-            part = self._signs.part(self._direct.variables, own, signs)
-            found = self._direct.with_values(signs).over(part)
-            if not found.proven and not self._by_levels(box, signs):
-                return self._widened(found, box)
-        return Found(True)
-
-    def _by_levels(self, box: Box, signs: Values) -> bool:
+    def _otherwise(self, box: Box, signs: Values) -> bool:
+        """By the levels, if there are any."""
         total = arb(0)
         lengths: list[Ball] = []
         for own, gains in self._levels:
@@ -232,8 +228,6 @@ class LipschitzBelow:
 
     def _widened(self, found: Found, box: Box) -> Found:
         """What to split: where there are kinks, whatever is wide in them; else what causes the width."""
-        if not found.caused:
-            return Found(False)
         kinked = range(len(box)) if self._levels else self._signed
         caused = [hi - lo if i in kinked else 0.0 for i, (lo, hi) in enumerate(box)]
         spread = list(caused)
@@ -244,10 +238,7 @@ class LipschitzBelow:
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """The Jacobian is too large at a point at which h is smooth."""
-        signs = self._signs.at([point[i] for i in self._signed])
-        if signs is None:
-            return False
-        return not self._levels and self._direct.with_values(signs).broken([point[i] for i in self._columns])
+        return not self._levels and super().broken(point)
 
 
 def _levels(entries: Sequence[Term], fields: Fields) -> list[tuple[Matrix, list[Matrix]]]:
