@@ -13,18 +13,7 @@ from fractions import Fraction
 
 from flint import arb, arb_mat
 
-from tubecert.recheck.balls import (
-    Ball,
-    between,
-    ceiling,
-    column,
-    exact,
-    is_indefinite,
-    joined,
-    picked,
-    proposed_largest,
-    whitening,
-)
+from tubecert.recheck.balls import Ball, between, ceiling, exact, is_indefinite, proposed_largest, whitening
 from tubecert.recheck.boxes import Box, Expansion, Field, Found
 from tubecert.recheck.monomials import Combinations
 from tubecert.recheck.quotients import cancelled
@@ -219,7 +208,7 @@ class GainBelow:
             mixing = self._mixing(part, self._limit * mu)
             sizes = self._mixing(abs(part), abs(self._limit * mu), 1)
             for e in expansions:
-                rest = (sizes * column(e.rest)).entries()
+                rest = (sizes * arb_mat(len(e.rest), 1, e.rest)).entries()
                 if not definite_on(replace(e.mapped(mixing.__mul__), rest=rest), T):
                     return False
         return True
@@ -227,13 +216,13 @@ class GainBelow:
     def _mixing(self, of_input: Ball, of_metric: Ball, of_drift: int = -1) -> arb_mat:
         """The matrix that combines lower triangles of B B', W and F."""
         k = self._n * (self._n + 1) // 2
-        unit = picked(range(k), k)
-        return joined([[unit * weight for weight in (of_input, of_metric, arb(of_drift))]])
+        mixed = of_input, of_metric, arb(of_drift)
+        return arb_mat(k, 3 * k, [w * int(i == j) for i in range(k) for w in mixed for j in range(k)])
 
     def _combined(
         self, entries: Sequence[Ball], of_input: Ball, of_metric: Ball, of_drift: int = -1
     ) -> arb_mat:
-        mixed = self._mixing(of_input, of_metric, of_drift) * column(entries)
+        mixed = self._mixing(of_input, of_metric, of_drift) * arb_mat(len(entries), 1, entries)
         return square(self._n, mixed.entries())
 
     def _weights(self, centre: Sequence[Ball], m: float) -> list[float]:
