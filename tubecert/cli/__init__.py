@@ -12,15 +12,13 @@ Until a command is called, nothing but typer and the error family is imported: `
 | `certify`, `check`, ... | commands that do more than show what the library gives |
 """
 
-import sys
-
 
 def main() -> None:
     """The entry point. It imports the rest itself: from its first line on an interruption has its exit code.
 
     It does not return: the process ends here, with a code that is one of ours.
     """
-    code = 3  # ExitCode.INTERNAL: what is not imported yet cannot fail
+    code, line = 3, ""  # ExitCode.INTERNAL: what is not imported yet cannot fail
     try:
         from tubecert.cli import process
 
@@ -29,14 +27,13 @@ def main() -> None:
 
         code = keeper.kept(_work)
     except KeyboardInterrupt as stop:
-        code = 130  # ExitCode.INTERRUPTED; `leave` knows the signal
-        if sys.stderr is not None:
-            print(f"tubecert: {str(stop) or 'interrupted'}", file=sys.stderr)
+        code, line = 130, str(stop) or "interrupted"  # ExitCode.INTERRUPTED; `leave` knows the signal
     except BaseException as error:
-        if sys.stderr is not None:
-            print(f"tubecert: internal error: {type(error).__name__}: {str(error)[:200]!a}", file=sys.stderr)
+        line = f"internal error: {type(error).__name__}: {str(error)[:200]!a}"
     from tubecert.cli import process
 
+    if line:
+        process.say(f"tubecert: {line}")
     process.leave(code)
 
 

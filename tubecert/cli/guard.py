@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
+from tubecert.cli.process import say
 from tubecert.errors import ExitCode, ProcessorError, TargetError, TubecertError
 from tubecert.printable import printable_lines
 
@@ -65,7 +66,7 @@ def refuse_usage(error: Any) -> int:
     text = StringIO()
     error.show(file=text)
     said = text.getvalue().replace("Value error, ", "")  # jargon of a library
-    _tell_as_is(printable_lines(said + usage_hint(error, sys.argv[1:])).rstrip("\n"))
+    say(printable_lines(said + usage_hint(error, sys.argv[1:])).rstrip("\n"))
     return int(error.exit_code)
 
 
@@ -143,14 +144,7 @@ def _drop_stdout() -> None:
 
 
 def _tell(text: str) -> None:
-    _tell_as_is(printable_lines(f"tubecert: {text}"))
-
-
-def _tell_as_is(text: str) -> None:
-    if sys.stderr is None:
-        return
-    with contextlib.suppress(OSError, ValueError):
-        print(text, file=sys.stderr, flush=True)
+    say(printable_lines(f"tubecert: {text}"))
 
 
 def _no_memory(error: MemoryError) -> str:

@@ -20,11 +20,12 @@ from math import inf
 from types import FrameType
 from typing import Final, TypedDict
 
+from tubecert.cli.process import SIGNALS, hear, say
+
 GRACE: Final = 1.0  # s to end by itself
 _TICK: Final = 0.1  # s between looks whether it has ended
 _SHOWN: Final = 20  # lines of what was found
 _INTERNAL, _UNDECIDED = 3, 4  # as in `errors.ExitCode`, which is not imported here
-_SIGNALS: Final = ("SIGINT", "SIGTERM", "SIGHUP")
 _WHY: Final[Mapping[int | None, str]] = {None: "undecided: the time was up", signal.SIGINT: "interrupted"}
 _READING: Final = "reading what it was given"
 _SHORTER: Final = (
@@ -83,7 +84,7 @@ def tell(news: News) -> None:
     if not _place:
         return
     data = json.dumps(news).encode() + b"\n"
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [*_numbers(), signal.SIGALRM])
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
         while data:
             data = data[os.write(_place[0], data) :]
@@ -115,9 +116,7 @@ class Keeper:
 
     def wait(self) -> int:
         """The exit code."""
-        for number in _numbers():
-            if signal.getsignal(number) != signal.SIG_IGN:
-                signal.signal(number, self._pass_on)
+        hear(self._pass_on)
         status: int | None = None
         while status is None:
             self._hear()
@@ -168,10 +167,10 @@ class Keeper:
         if self.killed:
             return self._instead(asked)
         if code < 0:
-            _say(
+            say(
                 f"tubecert: internal error: the process that worked was killed ({signal.Signals(-code).name})"
             )
-            _say("  perhaps for lack of memory: less work at a time needs less")
+            say("  perhaps for lack of memory: less work at a time needs less")
             self._account()
             return _INTERNAL
         late = code == _UNDECIDED and time.monotonic() > self.time
@@ -186,7 +185,7 @@ class Keeper:
         if sys.stderr is not None and sys.stderr.isatty():
             sys.stderr.write("\r\x1b[K\x1b[?25h")  # the line of a bar goes, the cursor comes back
         code = self._left(_UNDECIDED)
-        _say(f"tubecert: {_WHY.get(self.asked, 'terminated')}")
+        say(f"tubecert: {_WHY.get(self.asked, 'terminated')}")
         self._account()
         return code if asked is None else asked
 
@@ -203,7 +202,7 @@ class Keeper:
             for name, data in will["files"].items():
                 replace(Path(name), data.encode())
         except OSError as error:
-            _say(f"tubecert: cannot write {name!a}: {error.strerror}")
+            say(f"tubecert: cannot write {name!a}: {error.strerror}")
             return _INTERNAL
         if sys.stdout is not None:
             with contextlib.suppress(OSError, ValueError):
@@ -213,32 +212,18 @@ class Keeper:
 
     def _account(self) -> None:
         """Where it was, what it found, and what to do."""
-        _say(f"  after {time.monotonic() - _began:.0f} s, {self.at}")
+        say(f"  after {time.monotonic() - _began:.0f} s, {self.at}")
         if self.found:
             before = len(self.found) - _SHOWN
-            _say("  until then:" + (f" ({before} before these)" if before > 0 else ""))
+            say("  until then:" + (f" ({before} before these)" if before > 0 else ""))
         for line in self.found[-_SHOWN:]:
-            _say(f"    {line}")
-        _say(f"  next: {self.next}")
+            say(f"    {line}")
+        say(f"  next: {self.next}")
 
 
 def _begin(place: int, keeper: int) -> None:
-    """In the fork: tells there, is interrupted once, and does not outlive who keeps it."""
-    from tubecert.cli import process
+    """In the fork: tells there, and does not outlive who keeps it."""
     from tubecert.leash import follow
 
     _place.append(place)
-    for number in (*_numbers(), signal.SIGALRM):
-        if signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, process.interrupt)
     follow(keeper)
-
-
-def _numbers() -> list[signal.Signals]:
-    return [number for name in _SIGNALS if (number := getattr(signal, name, None)) is not None]
-
-
-def _say(line: str) -> None:
-    if sys.stderr is not None:
-        with contextlib.suppress(OSError, ValueError):
-            print(line, file=sys.stderr, flush=True)

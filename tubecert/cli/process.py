@@ -12,15 +12,18 @@ import contextlib
 import os
 import signal
 import sys
+from collections.abc import Callable
 from types import FrameType
 from typing import NoReturn
 
 _INTERNAL, _UNDECIDED, _INTERRUPTED = 3, 4, 130  # as in `errors.ExitCode`, which is not imported yet
-_SIGNALS = ("SIGTERM", "SIGHUP")  # as SIGINT: what is half written is removed, then 128 + the signal's number
+_ALARM = getattr(signal, "SIGALRM", None)  # sent where the time is up
+# what asks for an end: what is half written is removed, then 128 + the signal's number
+_ASKING = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None), _ALARM)
+SIGNALS = tuple(number for number in _ASKING if number is not None)
 # mallopt(3): the environment's name, the option's number, bytes
 _KEPT = (("MALLOC_MMAP_THRESHOLD_", -3, 32 << 20), ("MALLOC_TRIM_THRESHOLD_", -1, 256 << 20))
 _ENDED = b"tubecert: internal error: a library ended the process, perhaps for lack of memory"
-_ALARM = getattr(signal, "SIGALRM", None)  # sent where the time is up
 _WORDS = {signal.SIGINT: "interrupted", _ALARM: "undecided: the time was up"}
 _CODES = {_ALARM: _UNDECIDED}
 
@@ -36,13 +39,17 @@ def prepare() -> None:
 
     Memory that is freed stays with the process.
     """
-    for name in _SIGNALS:
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # nohup ignores SIGHUP
-            signal.signal(number, interrupt)
+    hear(interrupt)
     with contextlib.suppress(ImportError, OSError, AttributeError, MemoryError):
         _watch_exits()
         keep_memory()
+
+
+def hear(handler: Callable[[int, FrameType | None], None]) -> None:
+    """Calls it for every signal that asks for an end and is not ignored, as nohup ignores SIGHUP."""
+    for number in SIGNALS:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
@@ -81,6 +88,13 @@ def keep_memory() -> None:
         if name not in os.environ:
             library.mallopt(option, size)
             os.environ[name] = str(size)
+
+
+def say(line: str) -> None:
+    """A line on stderr, if there is one that takes it."""
+    if sys.stderr is not None:
+        with contextlib.suppress(OSError, ValueError):
+            print(line, file=sys.stderr, flush=True)
 
 
 def leave(code: int) -> NoReturn:
