@@ -10,5 +10,4 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 | `certification`, `sampled`, `stated`, `simulation`, `reading`, `shown` | what they give, as values |
 | `plain`, `specification` | values of Python as a specification; `check` |
 | `workers` | who helps: processes, or a cluster |
-| `figures` | the tube and the trade-off, drawn into axes |
 """

@@ -8,20 +8,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
+from tubecert.certificate.belonging import Belonging, compared_canonically
+from tubecert.controller.data import data_of
+from tubecert.controller.recursion import SampledController
 from tubecert.enclosure.interval import Array
 from tubecert.library.certifying import ran
 from tubecert.library.specification import Specification
 from tubecert.library.stated import Stated, array, rounded, rounded_up
 from tubecert.progress import Phase, Progress, Step
+from tubecert.report.figures_sampled import band
+from tubecert.report.page import Reason
 from tubecert.sampled_loop.record import Certificate, Result, Shares, certificate_text
 from tubecert.spec import Spec
-
-if TYPE_CHECKING:
-    from tubecert.certificate.belonging import Belonging
-    from tubecert.controller.recursion import SampledController
-    from tubecert.report.page import Reason
+from tubecert.words.sampled_loop import assumed, lacking
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,9 +49,6 @@ class SampledCertification(Stated[Certificate]):
     @property
     def reasons(self) -> tuple[Reason, ...]:
         """What is lacking, in words: `claim`, `message` and `relax` (what would help)."""
-        from tubecert.report.page import Reason
-        from tubecert.words.sampled_loop import lacking
-
         return tuple(
             Reason(verdict=self.verdict, claim=kind, message=message, relax=help)
             for kind, message, help in lacking(self.result, self.certificate.notes)
@@ -60,8 +57,6 @@ class SampledCertification(Stated[Certificate]):
     @property
     def assumptions(self) -> tuple[str, ...]:
         """What the claim rests on and does not show, in words."""
-        from tubecert.words.sampled_loop import assumed
-
         return tuple(assumed(self.result))
 
     @property
@@ -95,8 +90,6 @@ class SampledCertification(Stated[Certificate]):
     @property
     def tube(self) -> Tube | None:
         """The tube over time; None for a family of plans, and if nothing is proven."""
-        from tubecert.report.figures_sampled import band
-
         t, x, widths = band(self.certificate)
         if not self.certified or not t.size:
             return None
@@ -107,9 +100,6 @@ class SampledCertification(Stated[Certificate]):
 
         Raises `TubecertError` if nothing is certified, or without a controller.
         """
-        from tubecert.controller.data import data_of
-        from tubecert.controller.recursion import SampledController
-
         return SampledController(data_of(self.certificate))
 
 
@@ -130,8 +120,6 @@ def certification_of(certificate: Certificate, given: Specification | None = Non
 
 def compared(spec: Spec, result: Result) -> Belonging:
     """A certificate's result against a specification."""
-    from tubecert.certificate.belonging import compared_canonically
-
     own = result.spec
     return compared_canonically(spec, own.effective.data, own.settings, own.file_hash, result.planned)
 

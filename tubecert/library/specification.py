@@ -19,6 +19,7 @@ from tubecert.findings import Finding, NamedPlace, Severity
 from tubecert.library import plain
 from tubecert.library.plain import Data, Plain
 from tubecert.library.shown import Shown
+from tubecert.report.findings import page_of, summary
 from tubecert.spec import Setting, Spec, canonical
 from tubecert.spec.canonical import as_file
 from tubecert.spec.load import VERSION, Reads, again, load_source, whole
@@ -175,13 +176,9 @@ class Checked(Shown):
         return all(item.severity is Severity.NOTE for item in self.findings)
 
     def __str__(self) -> str:
-        from tubecert.report.findings import summary
-
         return "\n".join(map(str, (*self.findings, summary(self.findings, 1))))
 
     def _page(self) -> Page:
-        from tubecert.report.findings import page_of
-
         return page_of(self.name, self.findings)
 
 
