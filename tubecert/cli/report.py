@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tubecert.asking import CERTIFICATE, Text, words_of
+from tubecert.certificate.file import check_target, same_file
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.telling import refused
@@ -53,14 +54,12 @@ def check_pages(targets: Sequence[str], taken: Mapping[str, str | None]) -> None
 
     `taken` says which files must stay what they are.
     """
-    from tubecert import certificate
-
     kept = {what: path for what, path in taken.items() if path is not None}
     for page in targets:
         pages.Report.form_of(page)
-        certificate.check_target(page, pages.Report.remedy)
+        check_target(page, pages.Report.remedy)
         for what, path in kept.items():
-            if Path(path).resolve() == Path(page).resolve() or certificate.same_file(page, path):
+            if Path(path).resolve() == Path(page).resolve() or same_file(page, path):
                 message = f"cannot write {page}: it is the {what} itself"
                 raise refused(message, "choose another file for the page")
         kept[f"page {page}"] = page

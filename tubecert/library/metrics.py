@@ -12,6 +12,7 @@ from tubecert.asking import Number
 from tubecert.errors import ExitCode, SpecError
 from tubecert.findings import Finding, Location
 from tubecert.library.certifying import BUDGET, DEADLINE
+from tubecert.library.plain import Data, document_text
 from tubecert.library.shown import Shown
 from tubecert.library.specification import File, Specifiable, require_once, settings_in, spec_of
 from tubecert.progress import Progress
@@ -19,6 +20,7 @@ from tubecert.records import to_json
 from tubecert.report.page import Page
 from tubecert.report.progress import timed
 from tubecert.spec import Spec, Synthesis, metric_file
+from tubecert.spec.metric import solver_name
 from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -26,7 +28,6 @@ if TYPE_CHECKING:
 
     from tubecert.certificate.result import MetricFile
     from tubecert.enclosure.constant import Constant
-    from tubecert.library.plain import Data
     from tubecert.pipeline.synthesised import Synthesised
     from tubecert.pipeline.verification import Verified
 
@@ -148,8 +149,6 @@ def with_metric(spec: Spec, metric: MetricLike, rate: Fraction | None = None) ->
 
     `rate` stands in for that of coefficients. Raises `TubecertError`.
     """
-    from tubecert.library.plain import document_text
-
     if isinstance(metric, _Metric):
         return metric_file.with_metric_text(spec, metric.text(), f"<{IN_CODE}>"), IN_CODE
     if isinstance(metric, Mapping):
@@ -293,8 +292,6 @@ def wanted_of(
 
     Without a section the rate is that of the specification's own metric. Raises `SpecError` if they do not go together.
     """
-    from tubecert.spec.metric import solver_name
-
     own = system.synthesis
     if own is None:
         held = None if system.metric is None else system.metric.rate

@@ -6,20 +6,23 @@ import json
 import os
 from dataclasses import dataclass
 from html import escape
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Final
 
+from tubecert import files
 from tubecert.asking import Text, question
+from tubecert.certificate.file import write_bytes
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.reading import certificate_of
 from tubecert.library.shown import Paged
 from tubecert.library.specification import File
 from tubecert.report.page import Page
+from tubecert.report.page_simulation import TITLES, Simulated
 
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
-    from tubecert.report.page_simulation import Simulated
     from tubecert.report.quantities import AnyCertificate
 
 _HELP: Final = "give a folder that tubecert simulate --certificate wrote for this certificate"
@@ -43,9 +46,6 @@ class Report(Paged):
 
         PDF and PNG need matplotlib (the extra `simulate`), without which there are none. Raises `TargetError`.
         """
-        from importlib.util import find_spec
-
-        from tubecert.certificate.file import write_bytes
         from tubecert.report.figures_file import painted, svg_file
 
         told = self._page().figures
@@ -82,9 +82,6 @@ def report(result: Certification | SampledCertification | File, *, simulation: F
 
 def _simulated_in(folder: str, certificate: AnyCertificate) -> Simulated:
     """What a folder of `simulate` shows; raises `TargetError` for another folder, and for another certificate's."""
-    from tubecert import files
-    from tubecert.report.page_simulation import TITLES, Simulated
-
     kind = files.Kind(most=_MOST, unreadable="TC600", too_large="TC600", help=_HELP)
     try:
         summary = json.loads(files.read(os.path.join(folder, "summary.json"), kind))

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tubecert.asking import text_of
+from tubecert.certificate import file
+from tubecert.records import FormError
+
 if TYPE_CHECKING:
     from tubecert.library.certification import Certification
     from tubecert.library.sampled import SampledCertification
@@ -16,9 +20,6 @@ def read(path: File) -> Certification | SampledCertification:
     Raises `TargetError` for a file that is none, or that was changed afterwards. Its claims are not examined: that is
     what `recheck` does.
     """
-    from tubecert.asking import text_of
-    from tubecert.certificate import file
-    from tubecert.records import FormError
     from tubecert.sampled_loop.record import FORMAT, of_json
 
     source = text_of("result", path)

@@ -18,16 +18,19 @@ from tubecert.files import STDIN, read, read_stdin
 from tubecert.library.shown import Shown
 from tubecert.printable import printable_json
 from tubecert.progress import Phase, Progress, Step
+from tubecert.recheck import document
+from tubecert.recheck.certificate import opened, read_result
+from tubecert.recheck.run import BUDGET, Examined, Recheck, Report
+from tubecert.recheck.run import recheck as examined
 from tubecert.records import FormError
 from tubecert.report.page import Page
 from tubecert.report.progress import timed
+from tubecert.report.rechecked import page_of
 from tubecert.report.text import Rows
 
 if TYPE_CHECKING:  # of the producer, which takes longer to import than many certificates to examine
     from tubecert.library.specification import File, Specifiable
     from tubecert.library.stated import Stated
-    from tubecert.recheck.document import Node
-    from tubecert.recheck.run import Examined, Recheck, Report
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -63,8 +66,6 @@ class Rechecked(Shown):
         return self.found.failing
 
     def _page(self) -> Page:
-        from tubecert.report.rechecked import page_of
-
         return page_of(self.found, self.name, self.belongs)
 
     def _closing(self) -> Rows:
@@ -116,9 +117,6 @@ def recheck(
     folder that `export` wrote, whose code and numbers are compared with the certificate of a sampled loop. Raises
     `TubecertError` for what is no certificate.
     """
-    from tubecert.recheck.run import BUDGET
-    from tubecert.recheck.run import recheck as examined
-
     if isinstance(text := getattr(result, "text", None), str):
         name = str(getattr(result, "name", ""))
     else:
@@ -143,7 +141,6 @@ def _specified(text: str, name: str, spec: Specifiable) -> str:
     """A sentence that says that the certificate is of the specification; raises TC604 if it is not."""
     from tubecert.library import sampled
     from tubecert.library.specification import spec_of
-    from tubecert.recheck import document
     from tubecert.sampled_loop import record
 
     if parse(text.encode(), name, (FORMAT, record.FORMAT))["format"] != record.FORMAT:
@@ -154,17 +151,16 @@ def _specified(text: str, name: str, spec: Specifiable) -> str:
     return found.words(loaded.path)
 
 
-def belongs(document: Node, name: str, spec: Specifiable) -> str:
+def belongs(root: document.Node, name: str, spec: Specifiable) -> str:
     """The same of the certificate of a loop that rests on a metric."""
     from tubecert.certificate.belonging import compared
     from tubecert.certificate.result import Result
     from tubecert.library.specification import spec_of
-    from tubecert.recheck.certificate import opened, read_result
 
-    read_result(opened(document)[0])  # its form: what is compared below is there, and is what is examined
+    read_result(opened(root)[0])  # its form: what is compared below is there, and is what is examined
     loaded = spec_of(spec)
     try:
-        result = Result.from_json(document.mapping()["result"])
+        result = Result.from_json(root.mapping()["result"])
     except FormError as error:
         raise incomplete(name, str(error)) from error
     found = compared(loaded, result)
@@ -177,8 +173,6 @@ def _with_controller(found: Recheck, text: str, name: str, folder: str) -> Reche
 
     Raises `CertificateError` for the certificate of a loop in continuous time.
     """
-    from tubecert.recheck import document
-    from tubecert.recheck.run import Examined
     from tubecert.recheck.sampled_loop.exported import exported
 
     own = document.read(text, name)

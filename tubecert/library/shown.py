@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+from tubecert.certificate.file import write_text
 from tubecert.errors import ExitCode, TargetError
 from tubecert.findings import Finding
-
-if TYPE_CHECKING:
-    from tubecert.report.page import Page
-    from tubecert.report.text import Rows
+from tubecert.report import html, markdown
+from tubecert.report.page import Page
+from tubecert.report.text import Rows, headline
 
 
 class Shown:
@@ -38,8 +38,6 @@ class Shown:
         raise NotImplementedError
 
     def __str__(self) -> str:
-        from tubecert.report.text import headline
-
         return headline(self._page()).plain
 
     def __repr__(self) -> str:
@@ -70,21 +68,15 @@ class Paged(Shown):
     @property
     def html(self) -> str:
         """The page as one HTML file that needs nothing else."""
-        from tubecert.report.html import render_page
-
-        return render_page(self._page())
+        return html.render_page(self._page())
 
     @property
     def markdown(self) -> str:
         """The same words and tables as Markdown, without figures: for a pull request."""
-        from tubecert.report.markdown import render_page
-
-        return render_page(self._page())
+        return markdown.render_page(self._page())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write it, by the ending of the name. Raises `TargetError`."""
-        from tubecert.certificate.file import write_text
-
         target = os.fspath(path)
         write_text(target, getattr(self, self.form_of(target)), self.remedy)
 

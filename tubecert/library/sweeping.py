@@ -37,6 +37,7 @@ from tubecert.report.page import Page
 from tubecert.report.progress import timed
 from tubecert.report.text import Rows
 from tubecert.spec import Setting
+from tubecert.sweep.grid import Axis
 
 if TYPE_CHECKING:
     from tubecert.enclosure.interval import Array
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from tubecert.library.sampled import SampledCertification
     from tubecert.report.quantities import Value
     from tubecert.report.sweep import Row, SweepTable
-    from tubecert.sweep.grid import Axis
     from tubecert.sweep.run import Sweep
 
 REMEDY: Final = "the folder of a sweep must stay there while it runs"
@@ -234,8 +234,6 @@ def sweep(
 
 def _axes(over: Mapping[str, Range] | Iterable[str]) -> list[Axis]:
     """The ranges; raises `SpecError` with everything that is wrong with them."""
-    from tubecert.sweep.grid import Axis
-
     if not over:
         own = asking.named("over")
         asking.refuse(
