@@ -7,8 +7,9 @@ of a file name that is not UTF-8) is shown as an escape, so that nothing can pas
 
 from __future__ import annotations
 
+import json
 import re
-from typing import Final
+from typing import Any, Final
 
 _COMMAND: Final = re.compile(r"##(?=\w*\[)|^\s*::")
 _IN_JSON: Final = re.compile(r"[^\n\x20-\x7e\xa1-\xac\xae-\u02ff]")  # candidates; most of them do print
@@ -42,6 +43,11 @@ def printable_lines(text: str) -> str:
 def printable_json(text: str) -> str:
     r"""JSON with `\u....` in place of characters that do not print: it says the same."""
     return _IN_JSON.sub(lambda match: match[0] if match[0].isprintable() else _units(match[0]), text)
+
+
+def json_text(data: Any) -> str:
+    """Data as a file of JSON, in which every character prints."""
+    return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
 
 
 def _escape(character: str) -> str:

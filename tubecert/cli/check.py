@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,7 +21,7 @@ from tubecert.findings import Finding, Severity
 from tubecert.library.certifying import SCHEDULER
 from tubecert.library.reading import read
 from tubecert.library.workers import cluster_at
-from tubecert.printable import printable_json, visible
+from tubecert.printable import json_text, visible
 from tubecert.progress import Phase
 from tubecert.report import findings
 from tubecert.report.progress import Pieces
@@ -184,9 +183,7 @@ def written(form: str, results: Sequence[Checked], terminal: Terminal, *, quiet:
         closing = findings.summary(found, len(results))
         return terminal.text(findings.render(() if quiet else found, closing=closing))
     if form == "json":
-        return (
-            printable_json(json.dumps([*map(findings.as_data, found)], indent=1, ensure_ascii=False)) + "\n"
-        )
+        return json_text([*map(findings.as_data, found)])
     text: str = import_module(f"tubecert.report.{form}").render(results)
     return text
 

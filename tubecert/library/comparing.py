@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from tubecert.library.reading import certificate_of
 from tubecert.library.sampled import SampledCertification
 from tubecert.library.shown import Paged
 from tubecert.library.specification import File
-from tubecert.printable import printable_json
+from tubecert.printable import json_text
 from tubecert.report.comparison import Comparison as Sides
 from tubecert.report.comparison import page_of
 from tubecert.report.page import Page
@@ -60,7 +59,7 @@ class Comparison(Paged):
     @property
     def json(self) -> str:
         """As JSON."""
-        return printable_json(json.dumps(self.sides.json(), indent=1, ensure_ascii=False)) + "\n"
+        return json_text(self.sides.json())
 
     def _page(self) -> Page:
         return page_of(self.sides)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 from collections.abc import Callable
@@ -16,7 +15,7 @@ from tubecert.certificate.file import FORMAT, KIND, incomplete, parse, unreadabl
 from tubecert.errors import ExitCode
 from tubecert.files import STDIN, read, read_stdin
 from tubecert.library.shown import Shown
-from tubecert.printable import printable_json
+from tubecert.printable import json_text
 from tubecert.progress import Phase, Progress, Step
 from tubecert.recheck import document
 from tubecert.recheck.certificate import opened, read_result
@@ -87,7 +86,7 @@ class Rechecked(Shown):
             "not_examined": list(self.found.unread),
             **({"specification": self.belongs} if self.belongs else {}),
         }
-        return printable_json(json.dumps(data, indent=1, ensure_ascii=False)) + "\n"
+        return json_text(data)
 
     @property
     def _exit_code(self) -> ExitCode:

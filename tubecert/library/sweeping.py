@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -29,7 +28,7 @@ from tubecert.library.specification import (
     source_of,
 )
 from tubecert.library.workers import cluster_at
-from tubecert.printable import printable_json
+from tubecert.printable import json_text
 from tubecert.progress import Progress
 from tubecert.records import exact_json
 from tubecert.report.html import render_page
@@ -148,7 +147,7 @@ class Swept(Shown):
             for row in self.table.cells()
         )
         rows = [dict(zip(self.table.header, row, strict=True)) for row in cells]
-        return printable_json(json.dumps(rows, indent=1, ensure_ascii=False)) + "\n"
+        return json_text(rows)
 
     @property
     def _exit_code(self) -> ExitCode:
