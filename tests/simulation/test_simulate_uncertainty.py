@@ -56,7 +56,7 @@ def test_random_members_and_adversaries_are_in_the_class(kind, seed):
     rng = np.random.default_rng(seed)
     offset = rng.normal(size=(kind.n, 3))
     assert_in_class(random_members(kind, rng.random((kind.member, 3)), offset), kind, offset, rng)
-    assert_in_class(adversaries(kind, rng.random((kind.adversary, 3)), offset, 0.1), kind, offset, rng)
+    assert_in_class(adversaries(kind, rng.random((kind.adversary, 3)), offset), kind, offset, rng)
 
 
 def test_the_triangle_has_slope_one_and_no_overshoot():
@@ -74,7 +74,7 @@ def halves(kind):
 
 def test_adversaries_move_as_fast_as_they_may():
     kind = Class(h=2.0, h_x=0.0, h_t=4.0, h_initial=2.0, n=2, m=1)
-    waves = adversaries(kind, halves(kind), np.zeros((2, 1)), 0.1)
+    waves = adversaries(kind, halves(kind), np.zeros((2, 1)))
     t = np.linspace(0, 20, 20001)
     h = values(waves, t, np.zeros((len(t), 2)))[0, :, 0]
     fastest = np.abs(np.diff(h)).max() / (t[1] - t[0])
@@ -92,10 +92,10 @@ def test_random_members_use_the_class():
 
 
 def test_pushes_use_the_class():
-    kind = Class(h=1.0, h_x=2.0, h_t=3.0, h_initial=1.0, n=2, m=1, push=(4.0, 5.0))
+    kind = Class(h=1.0, h_x=2.0, h_t=3.0, h_initial=1.0, n=2, m=1, push=(4.0, 5.0), layer=0.5)
     genes = halves(kind)
     genes[3] = 1.0
-    waves = adversaries(kind, genes, np.zeros((2, 1)), 0.5)
+    waves = adversaries(kind, genes, np.zeros((2, 1)))
     # slope of the direction: 4/0.5 per push; rate: 5/0.5 per push
     assert waves.push[0] == pytest.approx(min(2.0 / 8, 3.0 / 10, 1.0), rel=1e-6)
     size, slope = np.linalg.norm(waves.amplitude, axis=1), np.linalg.norm(waves.wave, axis=1)

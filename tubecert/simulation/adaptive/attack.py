@@ -33,7 +33,7 @@ def cases(setting: Setting, seed: int, numbers: Sequence[int]) -> Cases:
     (coin,), own, aimed, beside, begin = np.split(genes, sizes[:-1])
     start = _random_starts(setting, begin)
     offset = setting.S @ (start - setting.centre[:, None])
-    both = random_members(kind, own, offset), adversaries(kind, aimed, offset, setting.layer)
+    both = random_members(kind, own, offset), adversaries(kind, aimed, offset)
     chosen = (np.where(coin < 0.5, a, b) for a, b in zip(both[0][1:], both[1][1:], strict=True))
     return _cases(setting, start, Disturbance(None, *chosen), beside)
 
@@ -49,7 +49,7 @@ def _cases(setting: Setting, start: Array, h: Disturbance, beside: Array) -> Cas
         wave=wave,
         phase=h.phase - np.einsum("wjn,j->wn", wave, setting.centre),
         radius=np.full(N, kind.h if kind.beside else np.inf),
-        layer=np.full(N, setting.layer),
+        layer=np.full(N, kind.layer),
     )
     return Cases(start, acting(kind, h, beside))
 
@@ -69,7 +69,7 @@ def bred(setting: Setting, genes: Array) -> Cases:
     aimed, beside, begin = np.split(genes, np.cumsum([kind.adversary, kind.beside]))
     start = setting.started(2 * begin - 1 if setting.varied else np.zeros((len(setting.x0), genes.shape[1])))
     offset = setting.S @ (start - setting.centre[:, None])
-    return _cases(setting, start, adversaries(kind, aimed, offset, setting.layer), beside)
+    return _cases(setting, start, adversaries(kind, aimed, offset), beside)
 
 
 def worst(setting: Setting, loop: Loop, seed: int, known: Runs, report: Progress | None = None) -> Cases:

@@ -30,7 +30,6 @@ from tubecert.spec import Spec
 from tubecert.trajectory import Plan
 
 CHOSEN: Final = "chosen, not certified"
-_LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
 _TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
 _LIMIT: Final = 100  # of the greatest radius: what is further away from the plan is not followed any more
 _DEGREE: Final = 5  # of the polynomials that geodesics are
@@ -59,7 +58,6 @@ class Setting(Certified):
     E: Matrix
     rest: Matrix
     h: tuple[Expression, ...] | None
-    layer: float
 
     @property
     def varied(self) -> bool:
@@ -127,7 +125,6 @@ def setting_of(
         E=_wind(model, field),
         rest=_rest(model, field),
         h=None if wanted is None else tuple(term.expression for term in wanted),
-        layer=_LAYER * certified["metric_input_gain"] * certified.reach,
     )
 
 

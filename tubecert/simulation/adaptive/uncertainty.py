@@ -29,6 +29,7 @@ _FAINT: Final = 0.3  # of the random members use only a part of |h|
 _HALVINGS: Final = 60  # until a start is what |h(0, x(0))| allows
 _TINY: Final = float(np.finfo(float).tiny)
 _NOWHERE: Final = 1 - 1e-9  # twice the genes that have no direction: none has them
+_LAYER: Final = 0.25  # of what |B'M gamma_s| can reach in the tube, for adversaries that push
 _STEADY: Final = 0.2  # below, a wind never turns round
 _ENDS: Final = 1.6  # parameters lie at the ends of their ranges in 3 of 8 cases
 
@@ -37,7 +38,8 @@ _ENDS: Final = 1.6  # parameters lie at the ends of their ranges in 3 of 8 cases
 class Class:
     """Bounds of |h|, |h_x|, |h_t| and |h(0, x(0))|, n states, m inputs.
 
-    `push` bounds how fast B'M gamma_s changes with x, and with t along the plan; None where that is not known. Beside h
+    `push` bounds how fast B'M gamma_s changes with x, and with t along the plan; None where that is not known. `layer`
+    is so much of |B'M gamma_s|, within which what pushes along it does so by less (`loops.Disturbance`). Beside h
     there may be |w| <= `wind` for a w of k entries, which turns round as `pace` (lambda, 1/s) says, and parameters in
     `ranges` (p, 2).
     """
@@ -49,6 +51,7 @@ class Class:
     n: int
     m: int
     push: tuple[float, float] | None = None
+    layer: float = 1.0
     pace: float = 0.0
     k: int = 0
     wind: float = 0.0
@@ -85,6 +88,7 @@ def class_of(certified: Certified, model: ControlAffineModel) -> Class:
         n=len(model.states),
         m=len(model.inputs),
         push=push,
+        layer=_LAYER * certified["metric_input_gain"] * certified.reach,
         pace=certified.rate,
         k=len(model.E[0]) if model.E else 0,
         wind=float(model.wind_bound or 0),
@@ -130,14 +134,14 @@ def triangle(waves: int) -> tuple[Array, Array]:
     return j, np.asarray(4 / np.pi * weight * (-1.0) ** np.arange(waves) / j**2)
 
 
-def adversaries(kind: Class, genes: Array, offset: Array, layer: float) -> Disturbance:
+def adversaries(kind: Class, genes: Array, offset: Array) -> Disturbance:
     """Those of genes for frequency, phase, shares of h_x and push, directions; starts as for random members.
 
     Whatever the frequency, the wave moves as fast, or as far, as the class allows.
     """
     (j, c), last = (each[:, None] for each in triangle(WAVES)), 4 + kind.n
     frequency = 10.0 ** (3 * genes[0] - 1.5) * (kind.h_t / kind.h if kind.h > 0 else 1.0)
-    push, slope, rate = _pushed(kind, genes[3], layer)
+    push, slope, rate = _pushed(kind, genes[3])
     room = [bound * _ROUND - used for bound, used in ((kind.h, push), (kind.h_x, slope), (kind.h_t, rate))]
     height = np.maximum(0.0, np.minimum(room[0] / np.abs(c).sum(), _over(room[2], frequency)))
     steepness = np.where(height > 0, genes[2] * _over(room[1], height), 0.0)
@@ -150,9 +154,9 @@ def adversaries(kind: Class, genes: Array, offset: Array, layer: float) -> Distu
     return still._replace(amplitude=amplitude, frequency=j * frequency, wave=wave, phase=phase, push=push)
 
 
-def _pushed(kind: Class, share: Array, layer: float) -> tuple[Array, Array, Array]:
+def _pushed(kind: Class, share: Array) -> tuple[Array, Array, Array]:
     """The push, and what it uses of |h_x| and |h_t|: its direction turns at most by 1/layer of what it follows."""
-    slope, rate = (value / layer for value in kind.push or (0.0, 0.0))
+    slope, rate = (value / kind.layer for value in kind.push or (0.0, 0.0))
     most = 0.0
     if kind.push is not None:
         most = min(kind.h, *(b / a for a, b in ((slope, kind.h_x), (rate, kind.h_t)) if a > 0))
