@@ -225,9 +225,7 @@ def simulate(
 
 def _specified(setting: Setting) -> Cases:
     """Start and h of the specification."""
-    own = Disturbance.from_expressions(setting.h, setting.model, 1)
-    if setting.uncertainty.beside:
-        own = usual(setting.uncertainty, own)
+    own = usual(setting.uncertainty, Disturbance.from_expressions(setting.h, setting.model, 1))
     return Cases(setting.started(np.ones((len(setting.x0), 1))), own)
 
 

@@ -166,8 +166,7 @@ def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
     if promise.decay is not None:
         yield from _over_time(own, "D(t)", runs.distance, promise.decay(runs.t), own.setting.reach)
     for lane in np.flatnonzero((found.stopped != 0) & own.left).tolist():
-        value, rho = float(found.peak["deviation"][lane]), own.setting.rho
-        t = float(found.ended[lane])
+        t, value, rho = float(found.ended[lane]), float(found.peak["deviation"][lane]), own.setting.rho
         yield Violation(of="tube", run=lane, t=t, value=value, bound=rho, share=value / rho)
 
 

@@ -133,7 +133,7 @@ class Cases(NamedTuple):
         return Cases(self.start[:, lanes], self.h.of(lanes))
 
 
-Batch: TypeAlias = tuple[LoopProblem, Cases]
+Batch: TypeAlias = tuple[LoopProblem, Cases]  # runs of a loop
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

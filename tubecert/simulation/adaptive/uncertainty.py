@@ -193,7 +193,7 @@ def _begun(kind: Class, amplitude: Array, angle: Array, push: Array) -> Array:
 
 
 def acting(kind: Class, h: Disturbance, genes: Array) -> Disturbance:
-    """h beside a wind and parameters.
+    """h beside a wind and parameters, if there are any.
 
     Genes (.., N): the aim of the wind, how fast it turns, its phase, its direction, the parameters.
     """
@@ -212,7 +212,7 @@ def acting(kind: Class, h: Disturbance, genes: Array) -> Disturbance:
 
 
 def usual(kind: Class, h: Disturbance) -> Disturbance:
-    """An h that is given for one lane, beside a wind that blows outward and does not turn."""
+    """An h that is given for one lane, beside a wind, if there is any, that blows outward and does not turn."""
     genes = np.full((kind.beside, 1), 0.5)
     genes[1:2] = 0.0
     return acting(kind, h, genes)

@@ -96,10 +96,9 @@ class Campaign:
         }
         self.clear = {each.index for each in own.result.clearance if each.verdict is Verdict.CERTIFIED}
         depths, runs = finite(into.max(axis=1)).tolist(), into.argmax(axis=1).tolist()
-        times = (float(own.t[at[run]]) for at, run in zip(node[n + m :], runs, strict=False))
         self.obstacles = [
-            Clearance(clearance=-depth, t=t, collides=depth >= 0, run=run)
-            for depth, t, run in zip(depths, times, runs, strict=True)
+            Clearance(clearance=-depth, t=float(own.t[at[run]]), collides=depth >= 0, run=run)
+            for depth, at, run in zip(depths, node[n + m : len(most) - 2 * m], runs, strict=True)
         ]
         self.outside = self._outside()
 
