@@ -19,7 +19,7 @@ from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
 from tubecert.expression import PI, Expression, constant, parse, substitute, symbol
 from tubecert.trajectory import Plan
-from tubecert.tube import Ball, Tube, containment
+from tubecert.tube import Tube, containment
 
 t, x, y, z, u = (symbol(name) for name in "txyzu")
 STATES = ("x", "y", "z")
@@ -283,20 +283,3 @@ def test_a_ball_projected_to_what_does_not_move_needs_no_time():
     found = supremum(scalar(symbol("z") ** 2), tube, Effort())
     assert found.above == pytest.approx((1 / 7 + 0.5) ** 2, rel=1e-3)
     assert found.below <= (1 / 7 + 0.5) ** 2 <= found.above
-
-
-def test_a_cut_of_one_per_cent_too_much_is_noticed(monkeypatch):
-    honest = Tube.contract
-
-    def contract(self, variables, lo, hi):
-        self.section, section = Ball(0.99 * 0.5), self.section
-        try:
-            return honest(self, variables, lo, hi)
-        finally:
-            self.section = section
-
-    monkeypatch.setattr(Tube, "contract", contract)
-    _, _, alive = tube_of("rest", 0.5).contract(
-        ("x", "y", "z"), np.array([[1 / 3 + 0.499, -2 / 7, 0.1]]), np.array([[1 / 3 + 0.5, -2 / 7, 0.1]])
-    )
-    assert not alive[0]

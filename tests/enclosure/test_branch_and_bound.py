@@ -383,47 +383,6 @@ def test_boxes_that_stay_below_a_value_that_is_reached_say_no_more(name, monkeyp
     assert own.above == pytest.approx(closer.above, rel=1e-13)
 
 
-def test_a_bound_reduced_by_two_per_cent_is_noticed(monkeypatch):
-    honest = Pencil.upper
-
-    def upper(self, lo, hi, target):
-        e = honest(self, lo, hi, target)
-        return type(e)(e.upper - 0.02 * np.abs(e.upper), e.corner, e.caused, e.spread)
-
-    monkeypatch.setattr(Pencil, "upper", upper)
-    objective, domain, truth = CASES["linear on a tube"]
-    with pytest.raises(AssertionError):
-        check(supremum(objective, domain, Effort(gap=1e-4)), truth, 1e-4)
-
-
-def test_settled_boxes_that_are_forgotten_are_noticed(monkeypatch):
-    monkeypatch.setattr(bnb.Search, "_settle", lambda self, bound: None)
-    objective, domain, truth = CASES["ripple"]
-    with pytest.raises(AssertionError):
-        check(supremum(objective, domain, Effort()), truth)
-
-
-def test_points_outside_the_domain_are_noticed(monkeypatch):
-    monkeypatch.setattr(Tube, "inside", lambda self, variables, points: (points, points))
-    objective, domain, truth = CASES["quadratic on a ball"]
-    with pytest.raises(AssertionError):
-        check(supremum(objective, domain, Effort()), truth)
-
-
-def test_one_half_of_the_domain_lost_is_noticed(monkeypatch):
-    honest = BoxDomain.boxes
-
-    def boxes(self, variables):
-        lo, hi = honest(self, variables)
-        return lo, 0.5 * (lo + hi)
-
-    monkeypatch.setattr(BoxDomain, "boxes", boxes)
-    monkeypatch.setattr(BoxDomain, "inside", lambda self, variables, points: (points, points))
-    objective, domain, truth = CASES["cubic at the end"]
-    with pytest.raises(AssertionError):
-        check(supremum(objective, domain, Effort()), truth)
-
-
 def test_unknown_values_are_never_taken_for_bounds():
     class Unknown:
         variables = ("x",)

@@ -304,16 +304,6 @@ def test_a_lying_routine_never_yields_a_false_enclosure(name, seed, monkeypatch)
             assert holds(value, lo, hi)
 
 
-@given(seed=SEEDS)
-@QUICK
-def test_false_enclosures_would_be_noticed(seed):
-    # without the residual the enclosure is LAPACK's word: the checks above must see the difference
-    m = symmetric(seed, "plain", 3)
-    found = eigenvalues(Interval.exact(m[None]))
-    exact = exact_eigenvalues(m)
-    assert not all(holds(v, found.lo[0, k] + 1e-3, found.hi[0, k] + 1e-3) for k, v in enumerate(exact))
-
-
 def exact_congruence(seed):
     rng = np.random.default_rng(seed)
     t, s = rng.standard_normal((3, 3)), symmetric(seed, "plain", 3)
@@ -324,12 +314,6 @@ def exact_product(seed):
     rng = np.random.default_rng(seed)
     a, b = rng.standard_normal((3, 3)), rng.standard_normal((3, 3))
     return covers(balls(a) * balls(b), *product((a, np.zeros_like(a)), (b, np.zeros_like(b))))
-
-
-@pytest.mark.parametrize("covered", [exact_congruence, exact_product])
-def test_forgotten_roundings_are_noticed(covered, monkeypatch):
-    monkeypatch.setattr(linalg, "_gamma", lambda k: 0.0)
-    assert sum(not covered(seed) for seed in range(20)) > 10
 
 
 @pytest.mark.parametrize("seed", range(20))
