@@ -319,7 +319,7 @@ def test_constants_in_z_are_above_sampled_ones(coordinates):
         assert value <= found[name].above * (1 + 1e-6), name
         assert found[name].below <= found[name].above
         if name != "h_x":  # where its norm vanishes, only a structural bound of it is known
-            assert found[name].above <= 1.15 * max(value, 0.0) + 1e-3, name
+            assert found[name].above <= 1.04 * max(value, 0.0) + 1e-3, name
 
 
 def constants_of(s):
