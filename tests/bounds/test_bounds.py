@@ -6,9 +6,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from balls import exactly as q
-from balls import prove
-from flint import arb, ctx
 from systems import (
     TWO,
     at_rest,
@@ -288,14 +285,6 @@ def test_constants_along_a_moving_plan_enclose_sampled_ones_within_a_hundredth(t
 
 
 @pytest.mark.slow
-def test_a_norm_has_its_slope_exactly(two):
-    assert two.h_x.above == pytest.approx(0.1, rel=1e-9)
-    assert two.h_x.above >= 0.1
-    assert two.h_x.below == pytest.approx(0.1, rel=1e-9)
-    assert two.h_x.below <= 0.1
-
-
-@pytest.mark.slow
 def test_the_initial_distance_is_the_length_of_the_segment(three):
     _, constants, _, spec = three
     end = np.array([float(q) for q in spec.x0])
@@ -431,39 +420,6 @@ def test_permuted_states_have_the_same_constants(three):
         changed = getattr(found, name)
         assert changed.below <= constant.above * (1 + 1e-12)
         assert constant.below <= changed.above * (1 + 1e-12)
-
-
-@pytest.mark.slow
-def test_the_drift_is_bounded_in_ball_arithmetic_too(three):
-    suprema, constants, _, _ = three
-    ctx.prec = 80
-    rho, bound = arb(suprema.rho), arb(constants.f.above * 1.1)
-
-    def settled(x):
-        if x[0] ** 2 + x[1] ** 2 + x[2] ** 2 > rho**2:
-            return True
-        f = three_forms(x, q)["f"]
-        return bool(f[0] ** 2 + f[1] ** 2 + f[2] ** 2 < bound**2)
-
-    half = Fraction(suprema.rho * 1.0001)
-    prove([(-half, half)] * 3, settled, 20_000)
-
-
-@pytest.mark.slow
-def test_the_drift_along_a_moving_plan_is_bounded_in_ball_arithmetic_too(two):
-    ctx.prec = 80
-    bound = arb(two.drift_on_plan.above * 1.15)
-
-    def settled(z):
-        t, d1, d2 = z
-        if d1**2 + d2**2 > arb(RHO_TWO) ** 2:
-            return True
-        f = two_forms([2 * t.cos() + d1, -2 * t.sin() + q("0.5") * (2 * t).cos() + d2], q)["f"]
-        u = 3 * t.sin()
-        return bool((f[0] + q("0.5") * u) ** 2 + (f[1] - 2 * u) ** 2 < bound**2)
-
-    half = Fraction(RHO_TWO * 1.0001)
-    prove([(Fraction(0), Fraction(5)), (-half, half), (-half, half)], settled, 40_000)
 
 
 @pytest.mark.parametrize("away", ["rounded", "1e-300", "1e-170", "0.001"])
