@@ -141,6 +141,11 @@ def test_points_of_which_nothing_is_known_hide_no_other():
     assert supremum(objective, Pieces(2), FEW).below == 1.0
 
 
+def test_unknown_values_are_never_taken_for_bounds():
+    found = supremum(Told(lambda x, w: np.inf, lambda x: np.nan), Pieces(), FEW)
+    assert (found.below, found.above) == (-np.inf, np.inf)
+
+
 def test_of_no_points_there_is_no_supremum():
     with pytest.raises(ValueError, match="the domain is empty"):
         supremum(Told(lambda x, w: 1.0, lambda x: 0.0), Nothing(3), FEW)

@@ -205,18 +205,6 @@ def test_dependency_that_hides_a_positive_divisor_is_split_away():
     check(found, 10.0)
 
 
-def test_an_empty_domain_is_refused():
-    class Nothing(BoxDomain):
-        def contract(self, variables, lo, hi):
-            return lo, hi, np.zeros(len(lo), dtype=bool)
-
-        def inside(self, variables, points):
-            return points[:0], points[:0]
-
-    with pytest.raises(ValueError, match="empty"):
-        supremum(scalar(x), Nothing({"x": (0.0, 1.0)}), Effort())
-
-
 def test_a_range_without_a_float_is_bounded_above_only():
     third = Fraction(1, 3)
     found = supremum(scalar(3 * x), BoxDomain({"x": (third, third)}), Effort())
@@ -381,22 +369,6 @@ def test_boxes_that_stay_below_a_value_that_is_reached_say_no_more(name, monkeyp
     assert own.below == closer.below
     assert own.boxes == closer.boxes
     assert own.above == pytest.approx(closer.above, rel=1e-13)
-
-
-def test_unknown_values_are_never_taken_for_bounds():
-    class Unknown:
-        variables = ("x",)
-
-        def upper(self, lo, hi, target):
-            e = scalar(x).upper(lo, hi, target)
-            return type(e)(np.full(len(lo), np.inf), e.corner, e.caused, e.spread)
-
-        def lower(self, lo, hi):
-            return np.full(len(lo), np.nan)
-
-    found = supremum(Unknown(), box(x=(0, 1)), Effort(budget=3_000))
-    assert found.above == math.inf
-    assert found.below == -math.inf
 
 
 def test_sanitised_bounds_reach_the_search():

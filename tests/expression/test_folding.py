@@ -11,6 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import fractions
+from test_graph import value as node_by_node
 
 from tubecert.expression import (
     ZERO,
@@ -70,29 +71,6 @@ def exact(e: Expression, point: Point) -> Fraction:
     return substitute([e], {name: constant(q) for name, q in point.items()})[0].fraction
 
 
-def by_nodes(e: Expression, point: Point) -> Fraction:
-    """The value of the graph itself, node by node."""
-    done: dict[Expression, Fraction] = {}
-    for node in topological([e]):
-        a = [done[arg] for arg in node.args]
-        match node.op:
-            case "const":
-                done[node] = node.fraction
-            case "symbol":
-                done[node] = point[str(node.value)]
-            case "add":
-                done[node] = a[0] + a[1]
-            case "mul":
-                done[node] = a[0] * a[1]
-            case "div":
-                done[node] = a[0] / a[1]
-            case "pow":
-                done[node] = a[0] ** int(str(node.value))
-            case op:
-                raise ValueError(op)
-    return done[e]
-
-
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(built=rational_functions, point=points)
@@ -101,7 +79,7 @@ def test_a_graph_has_the_value_of_its_construction(built: Built, point: Point) -
         value = built.at(point)
     except ZeroDivisionError:
         assume(False)
-    assert by_nodes(built.e, point) == value
+    assert node_by_node(built.e, point, Fraction) == value
     assert exact(built.e, point) == value
 
 
@@ -145,7 +123,7 @@ def test_a_derivative_is_that_of_dual_numbers(built: Built, point: Point, name: 
         value = built.at(duals)
     except ZeroDivisionError:
         assume(False)
-    assert by_nodes(derivative(built.e, name), point) == value.slope
+    assert node_by_node(derivative(built.e, name), point, Fraction) == value.slope
 
 
 EXPONENTS = [n for n in range(-12, 13) if n not in (0, 1)]

@@ -36,7 +36,7 @@ def by_definition(rows: list[list[Fraction]]) -> Fraction:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [1, 2, 3, 4])
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_determinant_and_adjugate_are_those_of_the_definition(n: int, data: st.DataObject) -> None:

@@ -2,10 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from itertools import permutations
-from math import prod
 
-import numpy as np
 import pytest
 from systems import plain_model
 
@@ -13,7 +10,6 @@ from tubecert.claims.family import Reason
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.expression import constant, symbol
-from tubecert.expression.matrix import determinant
 from tubecert.expression.parse import parse
 from tubecert.model import rank_decision
 from tubecert.pipeline import Options, certify
@@ -123,19 +119,6 @@ def test_a_knot_beyond_the_horizon_refutes_nothing():
 @pytest.mark.slow
 def test_a_curve_far_outside_is_refuted_within_few_boxes():
     assert far_beyond(knots("0 0 0 0", "1 1e300 0 0"), None, LINEAR.f) == "refuted"
-
-
-def test_determinants_of_numbers_are_eliminated():
-    rng = np.random.default_rng(0)
-    for n in range(1, 6):
-        rows = [[constant(int(v)) for v in row] for row in rng.integers(-3, 4, (n, n))]
-        rows[0][0] = ZERO
-        exact = sum(
-            (-1) ** sum(p[i] > p[j] for i in range(n) for j in range(i + 1, n))
-            * prod(int(rows[i][p[i]].fraction) for i in range(n))
-            for p in permutations(range(n))
-        )
-        assert determinant(rows) is constant(exact)
 
 
 @pytest.mark.parametrize("entry", ["1", "2 + sin(x25)"])

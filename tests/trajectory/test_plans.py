@@ -18,7 +18,6 @@ from tubecert.certificate import seal
 from tubecert.checking.cache import key_of_system
 from tubecert.enclosure.branch_and_bound import Effort, supremum
 from tubecert.enclosure.objective import MetricNorm, SumOfNorms, Target
-from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.errors import SpecError
 from tubecert.expression import constant, cos, number_text, sin, symbol
 from tubecert.expression.matrix import column
@@ -173,23 +172,6 @@ def test_nothing_beyond_the_horizon_counts():
     found = supremum(SumOfNorms([column(plan.u)], plan.fixed), plan.domain, Effort())
     assert found.above == pytest.approx(3.85, rel=1e-9)  # half way from -0.7 to -7
     assert found.below == pytest.approx(3.85, rel=1e-9)
-
-
-def test_fixed_variables_enter_with_their_whole_range():
-    """Data of a piece are thin; were they not, the expansion would still hold for all of them."""
-    function = MatrixFunction([((x**2 * y + x,), (sin(y) * x,))], fixed=frozenset({"y"}))
-    rng = np.random.default_rng(2)
-    lo = rng.uniform(-1, 1, (20, 2))
-    hi = lo + rng.uniform(0, 1, (20, 2))
-    e = function.expand(lo, hi)
-    assert not e.rest[0][1].any()  # nothing is caused by y, so it is never split
-    reach = e.mid[0], e.rad[0] + e.rest[0].sum(axis=0)
-    low, high = (reach[0] - reach[1]).min(axis=1), (reach[0] + reach[1]).max(axis=1)
-    for _ in range(200):
-        a, b = (lo + rng.uniform(0, 1, lo.shape) * (hi - lo)).T
-        value = np.stack([a**2 * b + a, np.sin(b) * a], axis=-1)[..., None]
-        assert (low <= value + 1e-12).all()
-        assert (value <= high + 1e-12).all()
 
 
 @pytest.mark.slow
