@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from tubecert.enclosure.tape import Tape
 from tubecert.expression import constant, cos, norm, parse, sin, symbol
 from tubecert.expression.matrix import identity
 from tubecert.model import ControlAffineModel
@@ -132,6 +133,12 @@ def two_forms(x: Sequence[Any], q: Any) -> dict[str, Any]:
     product = times(f_x, W)
     F0 = [[product[i][j] + product[j][i] for j in range(2)] for i in range(2)]
     return {"f": f, "f_x": f_x, "W": W, "F0": F0}
+
+
+def values(rows: Sequence[Sequence[Any]], names: Sequence[str], points: Any) -> Any:
+    """A matrix of expressions at points (N, n), in plain floats: (N, rows, columns)."""
+    tape = Tape([e for row in rows for e in row], tuple(names))
+    return tape.run_floats(list(points.T), (len(points),)).T.reshape(len(points), len(rows), -1)
 
 
 def times(a: Rows, b: Rows) -> Rows:

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import fractions
+from systems import values
 
 from tubecert.bounds.feedback import tangents
 from tubecert.enclosure import taylor
@@ -405,9 +406,7 @@ B = ((1 + x**2 / 4, y), (x * y, constant(2)), (ZERO, z**2))
 
 def at(rows, points):
     """A matrix of expressions at points (N, 3), in floats."""
-    function = MatrixFunction([rows])
-    own = ["xyz".index(name) for name in function.variables]
-    return function.floats(points[:, own])[0]
+    return values(rows, "xyz", points)
 
 
 def pencil_values(N, D):

@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from systems import values
 
 from tubecert.bounds.feedback import ClosedFormGain, down_to_zero, tangents
 from tubecert.enclosure.objective import Target
 from tubecert.enclosure.pencil import ProjectedPencil
-from tubecert.enclosure.tape import Tape
 from tubecert.expression import constant, cos, sin, symbol
 from tubecert.expression.matrix import matrix
 from tubecert.model import ControlAffineModel
@@ -36,12 +36,6 @@ MODEL = ControlAffineModel(
 )
 
 
-def values(rows, points):
-    """A matrix of expressions at points (N, 3), in floats."""
-    flat = Tape([e for row in rows for e in row], NAMES).run_floats(list(points.T), (len(points),))
-    return np.moveaxis(flat, 0, -1).reshape(len(points), len(rows), len(rows[0]))
-
-
 def boxes(count, width, seed=0):
     rng = np.random.default_rng(seed)
     lo = rng.uniform(-1, 1 - width, (count, 3))
@@ -51,10 +45,10 @@ def boxes(count, width, seed=0):
 
 def projected_values(model, points):
     """The largest eigenvalue of the pencil (N, D) on the null space of B'."""
-    basis = np.linalg.svd(values(model.B, points), full_matrices=True)[0][:, :, len(model.inputs) :]
+    basis = np.linalg.svd(values(model.B, NAMES, points), full_matrices=True)[0][:, :, len(model.inputs) :]
     turned = np.swapaxes(basis, -1, -2)
-    root = np.linalg.inv(np.linalg.cholesky(turned @ values(model.W, points) @ basis))
-    form = turned @ values(model.drift_form, points) @ basis
+    root = np.linalg.inv(np.linalg.cholesky(turned @ values(model.W, NAMES, points) @ basis))
+    form = turned @ values(model.drift_form, NAMES, points) @ basis
     return np.linalg.eigvalsh(root @ form @ np.swapaxes(root, -1, -2))[:, -1]
 
 
@@ -98,7 +92,7 @@ def test_the_closed_form_holds_over_boxes():
         above = gain.bound(centre - half, centre + half)
         for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
             points = np.concatenate([centre + share * half, np.zeros((9, 1))], axis=1)
-            W, F, B = (values(rows, points) for rows in (model.W, model.F, model.B))
+            W, F, B = (values(rows, NAMES, points) for rows in (model.W, model.F, model.B))
             t = np.linalg.inv(np.linalg.cholesky(W))
             image = t @ B
             u, s, _ = np.linalg.svd(image, full_matrices=True)

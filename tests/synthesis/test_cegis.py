@@ -8,11 +8,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from oracle import optimum
-from systems import F_THREE, F_TWO, matrix_of
+from systems import F_THREE, F_TWO, matrix_of, values
 from systems import plain_model as system
 
 from tubecert.enclosure.branch_and_bound import Effort
-from tubecert.enclosure.tape import Tape
 from tubecert.expression.matrix import identity
 from tubecert.synthesis import cegis
 from tubecert.synthesis import forms as symmetries
@@ -97,15 +96,11 @@ def test_forms_are_those_of_the_model(model, degree, framed):
     here, N = forms(points), forms.bases(points)
     n = len(model.states)
 
-    def values(matrix):
-        tape = Tape([e for row in matrix for e in row], model.states)
-        return tape.run_floats(list(points.T), (5,)).T.reshape(5, len(matrix), -1)
-
-    B = values(model.B)
+    B = values(model.B, model.states, points)
     assert np.abs(B.swapaxes(1, 2) @ N).max() < 1e-13 * max(1, np.abs(B).max())
-    W = values(full.W)
+    W = values(full.W, model.states, points)
     np.testing.assert_allclose(here.metric(V), W, rtol=1e-9, atol=1e-9)
-    F = N.swapaxes(1, 2) @ values(full.F) @ N
+    F = N.swapaxes(1, 2) @ values(full.F, model.states, points) @ N
     drift, weight = here.contraction(V)
     np.testing.assert_allclose(drift + 1.5 * weight, F, rtol=1e-8, atol=1e-8 * np.abs(F).max())
     # the rows of the semidefinite program are linear in the unknowns, and give the same

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from systems import values
 
 from tubecert import pipeline
-from tubecert.enclosure.tape import Tape
 from tubecert.model import build
 from tubecert.pipeline import Options
 from tubecert.spec import Synthesis, load_text
@@ -58,10 +58,8 @@ def scaled_condition(text, units, *, rate, **wanted):
     half = np.array([float(high) for _, high in spec.safe_set])
     n = len(half)
     points = np.random.default_rng(2).uniform(-1, 1, (4000, n)) * half
-    tape = Tape([e for row in model.W for e in row], model.states)
-    W = np.moveaxis(tape.run_floats(list(points.T), (len(points),)), 0, -1).reshape(-1, n, n)
-    values = np.linalg.eigvalsh(W / half[:, None] / half)
-    return values[:, -1].max() / values[:, 0].min()
+    found = np.linalg.eigvalsh(values(model.W, model.states, points) / half[:, None] / half)
+    return found[:, -1].max() / found[:, 0].min()
 
 
 @cache
@@ -244,11 +242,9 @@ def test_the_frame_of_a_moving_input_does_not_depend_on_units():
     for a, b, c in ((1, 1, 1), (1000, Fraction(1, 10**6), 1)):
         spec = load_text(TURNING.format(a=a, b=b, c=c))
         frame = metric_family(build(spec), degree=0, safe_set=spec.safe_set).frame
-        x = [0.1 * a, 0.2 * b, 0.05 * c]
-        tape = Tape([e for row in frame for e in row], spec.states)
-        values = tape.run_floats([np.array([q]) for q in x], (1,))
         scale = np.array([a, b, c], dtype=float)
-        frames.append(values.reshape(3, 3) * scale / scale[:, None])
+        (own,) = values(frame, spec.states, scale[None] * [0.1, 0.2, 0.05])
+        frames.append(own * scale / scale[:, None])
     assert frames[1] == pytest.approx(frames[0], rel=1e-9)
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import optimum, semidefinite
 from scipy import sparse
-from systems import BOX_THREE, F_THREE, F_TWO, THREE, TWO
+from systems import BOX_THREE, F_THREE, F_TWO, THREE, TWO, values
 from systems import plain_model as model
 
 from tubecert.enclosure.branch_and_bound import Effort
@@ -246,9 +246,7 @@ def contraction_values(asked, V, states):
 
     system = replace(asked.model, W=asked.family.dual_metric(rational(V)), rate=Q(asked.rate))
     form = multiply(transpose(system.annihilator), multiply(system.F, system.annihilator))
-    tape = Tape([-e for row in form for e in row], system.states)
-    values = tape.run_floats(list(np.array(states).T), (len(states),))
-    return values.T.reshape(len(states), len(form), len(form))
+    return -values(form, system.states, np.array(states))
 
 
 @pytest.mark.parametrize(

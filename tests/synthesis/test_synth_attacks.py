@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import fractions
 from systems import plain_model as model
+from systems import values
 
 from tubecert import pipeline
 from tubecert.claims.advice import LowerDegree
@@ -160,14 +161,7 @@ def sampled(spec, count=4000):
     system = build(spec)
     lo, hi = (np.array([float(side[k]) for side in spec.safe_set]) for k in (0, 1))
     points = lo + np.random.default_rng(0).uniform(0, 1, (count, len(lo))) * (hi - lo)
-    from tubecert.enclosure.taylor import MatrixFunction
-
-    def values(rows):
-        function = MatrixFunction([rows])
-        own = [spec.states.index(name) for name in function.variables]
-        return np.broadcast_to(function.floats(points[:, own])[0], (count, len(lo), len(lo)))
-
-    W, F = values(system.W), values(system.drift_form)
+    W, F = (values(rows, spec.states, points) for rows in (system.W, system.drift_form))
     eigenvalues = np.linalg.eigvalsh(W)
     # B = (0, 1)': the null space is x
     return (-0.5 * F[:, 0, 0] / W[:, 0, 0]).min(), eigenvalues[:, 0].min(), eigenvalues[:, -1].max()

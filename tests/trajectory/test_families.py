@@ -12,6 +12,7 @@ from proven import result as proven_result
 from rechecked import examine, failing, sealed
 from strategies import fractions
 from systems import FAMILY_TWO as FAMILY
+from systems import values
 
 from tubecert.bounds.suprema import Suprema
 from tubecert.certificate import dump, seal
@@ -73,14 +74,6 @@ def test_recheck_confirms_it(text):
     made = proven(text, bare=True, conditions="distance")
     assert made["result"]["verdict"] == "certified"
     assert failing(examine(made)) == []
-
-
-def values(rows, states, x):
-    """Entries at points (N, n), in plain floats."""
-    from tubecert.enclosure.tape import Tape
-
-    flat = [e for row in rows for e in row]
-    return Tape(flat, states).run_floats(list(x.T), (len(x),)).T.reshape(len(x), len(rows), -1)
 
 
 @pytest.mark.slow
