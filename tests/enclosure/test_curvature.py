@@ -11,6 +11,7 @@ from functools import cache
 from itertools import combinations, product
 from math import prod
 
+import balls
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -31,10 +32,7 @@ HALF, QUARTER = Fraction(1, 2), Fraction(1, 4)
 Power = tuple[int, ...]
 
 
-@pytest.fixture(autouse=True)
-def quiet():
-    with np.errstate(all="ignore"):
-        yield
+precision = balls.precision(53, quiet=True)
 
 
 @dataclass(frozen=True)
@@ -71,13 +69,6 @@ class Polynomial:
                 term = term * symbol(f"v{i}") ** k if k else term
             total = total + term
         return total
-
-
-def exact_points(lo, hi, parts):
-    """Points of the boxes in exact arithmetic."""
-    return [
-        Fraction(a) + part * (Fraction(b) - Fraction(a)) for a, b, part in zip(lo, hi, parts, strict=True)
-    ]
 
 
 def support(e, k, c):
@@ -118,9 +109,16 @@ shares = st.sampled_from([Fraction(0), Fraction(1), HALF, QUARTER, Fraction(2, 7
 
 
 @cache
-def of_all(one, count):
-    """One for every variable; strategies that are made anew for every example take longer than the tests."""
-    return st.lists(one, min_size=count, max_size=count)
+def placed(dim):
+    """A box, and an exact point of it; strategies that are made anew for every example take longer than the tests."""
+
+    def drawn(sides):
+        lo, hi = [a for (a, _), _ in sides], [a + width for (a, width), _ in sides]
+        parts = (part for _, part in sides)
+        exact = [Fraction(a) + q * (Fraction(b) - Fraction(a)) for a, b, q in zip(lo, hi, parts, strict=True)]
+        return lo, hi, exact
+
+    return st.lists(st.tuples(ends, shares), min_size=dim, max_size=dim).map(drawn)
 
 
 @pytest.mark.slow
@@ -130,8 +128,7 @@ def of_all(one, count):
 def test_the_enclosure_is_that_of_the_theorem(dim, data):
     """Mid part and rest of a cubic, vertex by vertex and cause by cause, are those that the docstring states."""
     p = data.draw(polynomials(dim, 3))
-    lo, width = zip(*data.draw(of_all(ends, dim)), strict=True)
-    hi = [a + w for a, w in zip(lo, width, strict=True)]
+    lo, hi, _ = data.draw(placed(dim))
     function = MatrixFunction([[[p.expression]]])
     assume(len(function._curved) == dim)  # a square may be lost beside a cube
     e = function.expand(np.array([lo]), np.array([hi]))
@@ -160,10 +157,7 @@ def test_the_enclosure_is_that_of_the_theorem(dim, data):
 def test_every_value_lies_in_the_hull_of_the_vertices(dim, degree, data):
     """Two polynomials side by side: every linear form of them is below its support over the vertices, exactly."""
     pair = [data.draw(polynomials(dim, degree, curved=False)) for _ in range(2)]
-    lo, width = zip(*data.draw(of_all(ends, dim)), strict=True)
-    hi = [a + w for a, w in zip(lo, width, strict=True)]
-    parts = data.draw(of_all(shares, dim))
-    point = exact_points(lo, hi, parts)
+    lo, hi, point = data.draw(placed(dim))
     function = MatrixFunction([[[p.expression for p in pair]]])
     own = [int(name[1:]) for name in function.variables]
     e = function.expand(np.array([lo])[:, own], np.array([hi])[:, own])
@@ -325,9 +319,7 @@ def test_variables_beyond_the_vertices_keep_the_whole_curvature(monkeypatch):
 def test_any_number_of_vertices_contains(data, kept):
     """The order of variables and how many are expanded change how tight a bound is, nothing else."""
     p = data.draw(polynomials(3, 3, curved=False))
-    lo, width = zip(*data.draw(of_all(ends, 3)), strict=True)
-    hi = [a + w for a, w in zip(lo, width, strict=True)]
-    point = exact_points(lo, hi, data.draw(of_all(shares, 3)))
+    lo, hi, point = data.draw(placed(3))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(taylor, "MOST_VERTICES", kept)
         function = MatrixFunction([[[p.expression]]])
@@ -343,9 +335,7 @@ def test_any_number_of_vertices_contains(data, kept):
 @QUICK
 def test_fixed_variables_enter_with_their_whole_range(data, order):
     p = data.draw(polynomials(3, 3, curved=False))
-    lo, width = zip(*data.draw(of_all(ends, 3)), strict=True)
-    hi = [a + w for a, w in zip(lo, width, strict=True)]
-    point = exact_points(lo, hi, data.draw(of_all(shares, 3)))
+    lo, hi, point = data.draw(placed(3))
     function = MatrixFunction([[[p.expression]]], order, fixed=frozenset({"v1"}))
     assert "v1" not in (*function._curved, *function._affine)
     own = [int(name[1:]) for name in function.variables]

@@ -4,6 +4,7 @@ import math
 from fractions import Fraction
 from itertools import product as combinations
 
+import balls
 import numpy as np
 import pytest
 
@@ -15,10 +16,7 @@ from tubecert.expression import symbol
 x = symbol("x")
 
 
-@pytest.fixture(autouse=True)
-def quiet():
-    with np.errstate(all="ignore"):
-        yield
+precision = balls.precision(53, quiet=True)
 
 
 def test_a_hull_reaches_to_either_side():

@@ -4,6 +4,7 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
+import balls as ball_arithmetic
 import mpmath
 import numpy as np
 import pytest
@@ -21,10 +22,7 @@ UNIT = Fraction(1, 2**52)  # in the last place of what lies in [1, 2)
 NOWHERE = np.zeros((1, 0))
 
 
-@pytest.fixture(autouse=True)
-def quiet():
-    with np.errstate(all="ignore"):
-        yield
+precision = ball_arithmetic.precision(53, quiet=True)
 
 
 def of_floats(rows):

@@ -10,21 +10,12 @@ from contextlib import contextmanager
 import pytest
 from commands import run
 from problems import judged_26, two_state
+from systems import SCALAR
 
 from tubecert.enclosure.processor import require_ieee
 from tubecert.errors import ProcessorError
 
 MODES = {"x86_64": (0x400, 0x800, 0xC00), "aarch64": (0x400000, 0x800000, 0xC00000)}
-SPEC = """
-tubecert: 1
-name: plain
-system: {states: [x], inputs: [u], f: ["-x"], B: [[1]]}
-safe_set: {x: [-2, 2]}
-uncertainty: {h: ["0.4*sin(t)"]}
-trajectory: {kind: equilibrium, at: [0], input: [0]}
-tube: {epsilon: 0.7, rho_a: 0.1}
-metric: {dual_metric: [[1]], rate: 1}
-"""
 EMPTY = "int nothing(void) { return 0; }\n"
 FLUSHED = """
 import ctypes, sys
@@ -69,7 +60,7 @@ def test_no_proof_is_made_then(monkeypatch):
 
 def test_no_constant_is_bounded_then_and_the_command_says_why(monkeypatch, tmp_path):
     monkeypatch.setattr("tubecert.enclosure.branch_and_bound.require_ieee", strange)
-    (tmp_path / "plant.yaml").write_text(SPEC)
+    (tmp_path / "plant.yaml").write_text(SCALAR)
     told = run("certify", tmp_path / "plant.yaml", "-o", tmp_path / "c.json")
     assert told.exit_code == 3
     assert "does not round as IEEE 754 does" in told.stderr

@@ -3,32 +3,24 @@
 from fractions import Fraction
 from itertools import pairwise
 
+import balls
 import numpy as np
 import pytest
 from balls import evaluate
-from flint import arb, ctx
+from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import NAMES, SYMBOLS, texts
+from strategies import NAMES, read, texts
 
 from tubecert.enclosure import taylor
 from tubecert.enclosure.taylor import MatrixFunction
-from tubecert.expression import ZERO, Expression, derivatives, norm, parse, symbol
+from tubecert.expression import ZERO, derivatives, norm, symbol
 
 SETTINGS = settings(max_examples=40, deadline=None)
 x, y, z = (symbol(name) for name in "xyz")
 
 
-@pytest.fixture(autouse=True)
-def precision():
-    before, ctx.prec = ctx.prec, 300
-    with np.errstate(all="ignore"):
-        yield
-    ctx.prec = before
-
-
-def read(text: str) -> Expression:
-    return parse(text, symbols=SYMBOLS, kinks=True).expression
+precision = balls.precision(300, quiet=True)
 
 
 def assert_contains(matrices, function, ends, inner):

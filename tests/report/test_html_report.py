@@ -43,6 +43,7 @@ from tubecert.report.outline import tube_outline
 from tubecert.spec import load, load_text
 
 ORBIT = (CONFIGS / "two_state_orbit.yaml").read_text(encoding="utf-8")
+THREE_STATE = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8")
 MADE = {
     "certified": certificates.certified,
     "refuted metric": certificates.refuted_metric,
@@ -61,25 +62,27 @@ def sealed(result):
     return certificate.seal(result, RUN)
 
 
+def certificate_of(text):
+    return json.loads(certificate.dump(sealed(certified_result(text).to_json())))
+
+
 @pytest.fixture(scope="module")
 def orbit():
     """A real certificate with a plan that moves, an obstacle beside the tube, and units."""
     text = ORBIT + "\nobstacles:\n  - {states: [x2, x1], disc: {center: [3, 3], radius: 1/2}}\n"
-    return json.loads(certificate.dump(sealed(certified_result(text).to_json())))
+    return certificate_of(text)
 
 
 @pytest.fixture(scope="module")
 def regulated():
     """A real certificate of three states at an equilibrium."""
-    text = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8")
-    return json.loads(certificate.dump(sealed(certified_result(text).to_json())))
+    return certificate_of(THREE_STATE)
 
 
 @pytest.fixture(scope="module")
 def outside():
     """A real refusal with a witness: the tube leaves the safe set."""
-    text = (CONFIGS / "three_state.yaml").read_text(encoding="utf-8").replace("rho_a: 0.01", "rho_a: 0.09")
-    return json.loads(certificate.dump(sealed(certified_result(text).to_json())))
+    return certificate_of(THREE_STATE.replace("rho_a: 0.01", "rho_a: 0.09"))
 
 
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("regulated", "outside")]
@@ -503,14 +506,9 @@ def test_markdown_tables_keep_their_columns(text):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    work = tmp_path / "work"
-    work.mkdir()
-    monkeypatch.chdir(work)
-    Path("plant.yaml").write_text(
-        (CONFIGS / "three_state.yaml").read_text(encoding="utf-8"), encoding="utf-8"
-    )
-    return work
+def folder(folder):
+    Path("plant.yaml").write_text(THREE_STATE, encoding="utf-8")
+    return folder
 
 
 @pytest.fixture
