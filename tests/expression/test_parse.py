@@ -187,6 +187,8 @@ def test_obligations_see_parameters_as_constants() -> None:
         ("x # y", 2, "comment"),
         ("x \\ y", 2, "backslashes"),
         ("x/0", 0, "division by zero"),
+        ("0/0", 0, "division by zero"),
+        ("x/(y - y)", 0, "division by zero"),
         ("x/(1 - 1)", 0, "division by zero"),
         ("0**-1", 0, "division by zero"),
         ("(x - x)**(-2)", 0, "division by zero"),
@@ -335,11 +337,6 @@ def test_what_powers_multiply_to_is_bounded_for_every_sign() -> None:
     assert refusal("(((x + 1)**-12 + 1)**-12 + 1)**-12").kind == "limit"
     assert refusal("(1e40)**-12*(1e300)**-12").kind == "limit"
     assert refusal("(1e300)**-12*x").kind == "limit"
-
-
-def test_a_divisor_that_is_zero_is_no_constant_to_forget() -> None:
-    for text in ("1/0", "x/0", "0/0", "0**-1", "x/(y - y)"):
-        assert refusal(text).message.startswith("division by zero")
 
 
 @pytest.mark.parametrize("word", sorted(elsewhere("functions")))
