@@ -12,10 +12,10 @@ import tubecert
 # what is there now, outside the edge (`counts.EDGE`) and recheck; lower a number when it falls
 MOST = {
     "mappings of Any": 0,
-    "string-key reads": 148,
-    "Any": 132,
+    "string-key reads": 122,
+    "Any": 125,
     "asserts that something is not None": 18,
-    "verdict literals": 15,
+    "verdict literals": 14,
     "comparisons with sentences": 2,
 }
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-from tubecert.certificate.belonging import Belonging, compared_canonically
 from tubecert.controller.data import data_of
 from tubecert.controller.recursion import SampledController
 from tubecert.enclosure.interval import Array
@@ -22,6 +22,9 @@ from tubecert.report.page import Reason
 from tubecert.sampled_loop.record import Certificate, Result, Shares, certificate_text
 from tubecert.spec import Spec
 from tubecert.words.sampled_loop import assumed, lacking
+
+if TYPE_CHECKING:
+    from tubecert.certificate.belonging import Belonging  # loads rooms that a sampled loop does not use
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,6 +123,8 @@ def certification_of(certificate: Certificate, given: Specification | None = Non
 
 def compared(spec: Spec, result: Result) -> Belonging:
     """A certificate's result against a specification."""
+    from tubecert.certificate.belonging import compared_canonically
+
     own = result.spec
     return compared_canonically(spec, own.effective.data, own.settings, own.file_hash, result.planned)
 

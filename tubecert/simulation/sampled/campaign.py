@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial, reduce
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -127,10 +127,10 @@ class Campaign:
         """Of a state or an input in some lanes (N,); None if there are none."""
         if not group.any():
             return None
-        return Peak(**self._met(index, int(np.argmax(np.where(group, self.peaks["share"][index], -1.0)))))
+        return self._met(index, int(np.argmax(np.where(group, self.peaks["share"][index], -1.0))))
 
-    def _met(self, index: int, number: int) -> dict[str, Any]:
-        return {"run": number} | {name: float(own[index, number]) for name, own in self.peaks.items()}
+    def _met(self, index: int, number: int) -> Peak:
+        return Peak(run=number, **{name: float(own[index, number]) for name, own in self.peaks.items()})
 
     @property
     def violations(self) -> list[Violation]:
@@ -140,7 +140,18 @@ class Campaign:
         for number in self.outside[:_LISTED]:
             index = int(self.peaks["share"][:, number].argmax())
             aimed = aims[number] if number < len(aims) else ""
-            found.append(Violation(of=names[index], aimed=aimed, **self._met(index, number)))
+            met = self._met(index, number)
+            found.append(
+                Violation(
+                    of=names[index],
+                    aimed=aimed,
+                    run=number,
+                    t=met.t,
+                    value=met.value,
+                    bound=met.bound,
+                    share=met.share,
+                )
+            )
         return found
 
     @property
