@@ -127,10 +127,11 @@ class Campaign:
         """Of a state or an input in some lanes (N,); None if there are none."""
         if not group.any():
             return None
-        return self._met(index, int(np.argmax(np.where(group, self.peaks["share"][index], -1.0))))
+        number = int(np.argmax(np.where(group, self.peaks["share"][index], -1.0)))
+        return Peak(run=number, **self._met(index, number))
 
-    def _met(self, index: int, number: int) -> Peak:
-        return Peak(run=number, **{name: float(own[index, number]) for name, own in self.peaks.items()})
+    def _met(self, index: int, number: int) -> dict[str, float]:
+        return {name: float(own[index, number]) for name, own in self.peaks.items()}
 
     @property
     def violations(self) -> list[Violation]:
@@ -141,17 +142,7 @@ class Campaign:
             index = int(self.peaks["share"][:, number].argmax())
             aimed = aims[number] if number < len(aims) else ""
             met = self._met(index, number)
-            found.append(
-                Violation(
-                    of=names[index],
-                    aimed=aimed,
-                    run=number,
-                    t=met.t,
-                    value=met.value,
-                    bound=met.bound,
-                    share=met.share,
-                )
-            )
+            found.append(Violation(of=names[index], aimed=aimed, run=number, **met))
         return found
 
     @property
