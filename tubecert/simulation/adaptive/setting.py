@@ -202,23 +202,28 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
         message = "parameters known by ranges stand in B, and the loops are stated for a known B"
         help = "give each of them one value: --set system.parameters.NAME=VALUE"
         raise TubecertError([Finding(code="TC705", message=message, location=where, help=help)])
-    kind, adapts = name_of(choice.source), controller == "l1"
-    filters = adapts or controller == "reference"
-    gains, covered = _gains(setting, controller, choice) if filters else (None, False)
-    return Loop(
+    loop = Loop(
         model=setting.model,
         plan=setting.plan,
         controller=controller,
         horizon=setting.horizon,
         times=setting.times,
-        gains=gains,
         limit=setting.limit,
         degree=_EVEN_DEGREE if _even(setting) else _DEGREE,
         P=setting.S.T @ setting.S,
         E=setting.E,
         rest=setting.rest,
-        gains_are="no adaptation" if gains is None else f"certified by {kind}" if covered else CHOSEN,
-        promise=promise(setting, kind) if covered and adapts else None,
+        gains_are="no adaptation",
+        promise=None,
+    )
+    if not loop.filters:
+        return loop
+    kind, (gains, covered) = name_of(choice.source), _gains(setting, loop, choice)
+    return replace(
+        loop,
+        gains=gains,
+        gains_are=f"certified by {kind}" if covered else CHOSEN,
+        promise=promise(setting, kind) if covered and loop.adapts else None,
     )
 
 
@@ -227,16 +232,16 @@ def _even(own: Certified) -> bool:
     return own.upper is not None and own.upper <= _EVEN * (own.reach / own.rho) ** 2
 
 
-def _gains(setting: Setting, controller: Controller, choice: Choice) -> tuple[LoopGains, bool]:
+def _gains(setting: Setting, loop: Loop, choice: Choice) -> tuple[LoopGains, bool]:
     """The gains of a loop that filters, and whether they are those that a certificate proves."""
-    adapts, kind = controller == "l1", name_of(choice.source)
+    adapts, kind = loop.adapts, name_of(choice.source)
     proven, smooth = setting.proven(kind), setting.spec.adaptation.smooth
     bandwidth = choice.bandwidth or (None if proven is None else proven.bandwidth)
     rate = choice.adaptation_rate or (None if proven is None else proven.adaptation_rate)
     if bandwidth is None or (adapts and rate is None):
         lacks = ("--bandwidth", bandwidth is None), ("--adaptation-rate", adapts and rate is None)
         options = " and ".join(option for option, missing in lacks if missing)
-        message = f"{kind} certifies no gains for the controller {controller}"
+        message = f"{kind} certifies no gains for the controller {loop.controller}"
         help = f"choose {options} (then nothing is covered by the certificate), or another --gains"
         raise TubecertError([Finding(code="TC705", message=message, help=help)])
     # R_H where no certificate gives one: Dh, with what the smooth layer needs
