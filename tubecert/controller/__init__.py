@@ -9,5 +9,6 @@ the same, and beside them what belongs to the certificate: `controller_data.h`, 
 | `plans` | what the computer knows of the plan: a row per sample, a formula, or nothing |
 | `data` | what belongs to the certificate: tables, limits, the plan, and their texts |
 | `folder` | the files, and how they are written |
+| `recursion` | the same recursion in numpy, for drivers in Python and for runs where there is no C compiler |
 | `compiled` | the same files, compiled here, for many loops at once |
 """

@@ -36,12 +36,8 @@ class Data:
         spec = question(result)
         machine, stages = spec.hardware, result.tube
         assert machine is not None
-        self.name, self.hash, self.tables, self.plan = (
-            spec.name,
-            certificate.hash,
-            tables,
-            Planned(result, spec),
-        )
+        self.name, self.hash = spec.name, certificate.hash
+        self.tables, self.plan = tables, Planned(result, spec)
         self.sizes, self.work, self.sample_time = (n, m, z), (z + m) * (z + n), machine.sample_time
         self.delay, self.real = machine.delayed, np.float32 if machine.arithmetic == "single" else np.float64
         noise = machine.noise if isinstance(machine.noise, tuple) else (machine.noise,) * n

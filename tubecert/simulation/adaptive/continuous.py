@@ -150,10 +150,8 @@ class Continuous:
 
     def _feedback(self, plan: Reference, ahead: Array, push: Array, geodesic: Geodesic) -> Array:
         """k (m, N) of (0.5); `ahead` is f(x) + B(x)u*, `push` is phi_1/2."""
-        lost, gained = (
-            np.einsum("in,in->n", plan.speed, geodesic.start),
-            np.einsum("in,in->n", geodesic.end, ahead),
-        )
+        lost = np.einsum("in,in->n", plan.speed, geodesic.start)
+        gained = np.einsum("in,in->n", geodesic.end, ahead)
         phi, reach = self._decay * geodesic.energy + 2 * (gained - lost), np.einsum("jn,jn->n", push, push)
         if not reach.all():
             self._stop((reach == 0) & (phi > _ROUNDING * (np.abs(lost) + np.abs(gained))), INFEASIBLE)
