@@ -98,7 +98,7 @@ class _Told:
     """What is told of a claim that is false, beside what is found: raises `_AnotherError` for what is another."""
 
     def __init__(self, case: Case, reason: Reason) -> None:
-        self.case, self.claim = case, reason.claim
+        self.case = case
         self.parameters: dict[str, Any] = reason.parameters
         self.t, self.x = reason.at or (None, ())
 
@@ -193,21 +193,20 @@ def _beyond_declared(told: _Told) -> Outcome:
     return _if(all(is_indefinite(told.value(form)) for form in forms))
 
 
-def _leaves(told: _Told) -> Outcome:
-    """The plan, or the ball around it of the radius that is told, is beyond a face of the safe set at a time.
+def _tube_leaves(told: _Told) -> Outcome:
+    """The ball around the plan of the radius that is told is beyond a face of the safe set at a time.
 
     That radius is the certificate's own word: the ball must be beyond it at the least that it can have.
     """
-    result, radius, least = told.case.result, Fraction(0), Fraction(0)
-    if told.claim == "tube_in_safe_set":
-        if result.specification.coordinates or result.tube is None:
-            return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
-        radius, least = result.tube.rho, _least_radius(told.case, result.tube)
-        told.same("radius", radius)
-    return _beyond(told, radius, least)
+    result = told.case.result
+    if result.specification.coordinates or result.tube is None:
+        return Outcome(verdict="undecided", why="half-widths are bounds of what the tube reaches")
+    least = _least_radius(told.case, result.tube)
+    told.same("radius", result.tube.rho)
+    return _leaves(told, result.tube.rho, least)
 
 
-def _beyond(told: _Told, radius: Fraction, least: Fraction) -> Outcome:
+def _leaves(told: _Told, radius: Fraction, least: Fraction) -> Outcome:
     """The plan, with `least` around it, is beyond the face that is told; the witness is `radius` beyond the plan."""
     s, family = told.case.system, told.case.result.specification.trajectory
     name, above = told.word("state", *s.states), told.word("side", "lower", "upper") == "upper"
@@ -271,8 +270,8 @@ _FALSE: Mapping[str, Callable[[_Told], Outcome]] = {
     "metric_contraction": _too_slow,
     "metric_killing": _not_killing,
     "metric_bound": _beyond_declared,
-    "tube_in_safe_set": _leaves,
-    "plan_in_safe_set": _leaves,
+    "tube_in_safe_set": _tube_leaves,
+    "plan_in_safe_set": lambda told: _leaves(told, Fraction(0), Fraction(0)),
     "start_in_tube": _starts_outside,
     "input_within_limits": _plan_exceeds,
 }
