@@ -7,6 +7,7 @@ length is at most width times the root of the mean of g(s) = delta'M delta; that
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import reduce
 from itertools import product
 
 from flint import arb, arb_mat
@@ -52,10 +53,7 @@ def offset(place: Place) -> Ball:
     for point in points(s):
         apart = place.fields.vector([[d] for d in off_plan(point, place.curve)])
         sizes.append(length(Program([d for (d,) in apart], ()).run(())))
-    largest = sizes[0]
-    for size in sizes[1:]:
-        largest = largest.max(size)
-    return largest
+    return reduce(arb.max, sizes)
 
 
 def points(s: System) -> list[Numbers]:
