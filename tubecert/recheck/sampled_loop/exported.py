@@ -27,7 +27,7 @@ from tubecert.recheck.certificate import opened
 from tubecert.recheck.cover import Outcome, stated
 from tubecert.recheck.document import Node
 from tubecert.recheck.program import Program
-from tubecert.recheck.sampled_loop.record import Proven, Result, read_result, single
+from tubecert.recheck.sampled_loop.record import Proven, read_result, single
 from tubecert.recheck.sampled_loop.remainders import Course, course_of
 from tubecert.recheck.specification import SampledSpecification
 from tubecert.recheck.specified.trajectory import Expressed, Resting
@@ -75,7 +75,7 @@ def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, 
         held = HeldPlan(course_of(spec, proven.plan), texts.get("x", ()), texts.get("u", ()))
         found = _PLAN.search(files[_DATA].decode("ascii"))
         xs, us = map(_rows, found.groups() if found else ())
-        same = files[_DATA] == _marked(_data(sealed, result, held, xs, us).encode())
+        same = files[_DATA] == _marked(_data(sealed, proven, held, xs, us).encode())
         why = held.wrong(xs, us) if same else f"{_DATA} is not what tubecert writes for it"
     except (ValueError, OverflowError, KeyError) as error:
         same, why = False, f"{_DATA} is not as tubecert writes it ({error})"
@@ -107,11 +107,9 @@ def _rows(text: str) -> Rows:
     return [[single(float.fromhex(word)) for word in row.split(", ")] for row in rows]
 
 
-def _data(sealed: str, result: Result, held: HeldPlan, xs: Rows, us: Rows) -> str:
-    """The text of the data of a result and its hash, with the plan that was found; raises `ValueError`."""
-    spec, proven = result.specification, result.proven
-    if proven is None:
-        raise ValueError("nothing is certified")
+def _data(sealed: str, proven: Proven, held: HeldPlan, xs: Rows, us: Rows) -> str:
+    """The text of the data of what is proven and of the hash, with the plan that was found."""
+    spec = held.course.spec
     machine, plant = spec.hardware, spec.plant
     matrices = {name: [list(map(float, row)) for row in own.tolist()] for name, own in proven.tables.items()}
     matrices |= {"xs": xs, "us": us}
@@ -163,7 +161,7 @@ class HeldPlan:
 
     def __init__(self, course: Course, x: Sequence[str], u: Sequence[str]) -> None:
         """`x` and `u` are texts of t, where the plan is given by such."""
-        self._course, spec, machine = course, course.spec, course.spec.hardware
+        self.course, spec, machine = course, course.spec, course.spec.hardware
         self._goes_on = isinstance(spec.trajectory, Expressed) and spec.afterwards == "repeat"
         self.kind = "PLAN_FORMULA" if self._goes_on else "PLAN_HANDED" if course.family else "PLAN_TABLE"
         self.lead = machine.delay + (machine.sample_time / 2 if machine.hold == "middle" else 0)
@@ -180,7 +178,7 @@ class HeldPlan:
 
     def _compute(self, x: Sequence[str], u: Sequence[str]) -> tuple[tuple[str, ...], list[list[Ball]]]:
         """The formula, and what it gives where it is looked at."""
-        machine, rounds = self._course.spec.hardware, Ball(1, 2.0**-53)
+        machine, rounds = self.course.spec.hardware, Ball(1, 2.0**-53)
         with ctx.workprec(53):
             now = [arb(float(machine.sample_time)) * k * rounds for k in _LOOKED_AT]
             then = [(t + float(self.lead)) * rounds for t in now]
@@ -195,11 +193,11 @@ class HeldPlan:
 
     def _at(self, t: Fraction) -> tuple[list[Ball], list[Ball]]:
         """x* (n) and u* (m) at a time; of a family 0."""
-        curve, horizon = self._course.curve, self._course.spec.trajectory.horizon
-        if self._course.family:
+        curve, horizon = self.course.curve, self.course.spec.trajectory.horizon
+        if self.course.family:
             return [arb(0)] * len(curve.x), [arb(0)] * len(curve.u)
         if horizon is not None and not self._goes_on:
-            t = t % horizon if self._course.spec.afterwards == "repeat" else min(t, horizon)
+            t = t % horizon if self.course.spec.afterwards == "repeat" else min(t, horizon)
         return curve.at(t)
 
     def wrong(self, xs: Rows, us: Rows) -> str:
@@ -208,7 +206,7 @@ class HeldPlan:
             return "the plan does not have a row for every sample"
         found = [*([Ball(v) for v in (*x, *u)] for x, u in zip(xs, us, strict=True)), *self._computed]
         samples = [*self.written, *(_LOOKED_AT if self._goes_on else ())]
-        period = self._course.spec.hardware.sample_time
+        period = self.course.spec.hardware.sample_time
         with ctx.workprec(128):
             wanted = [[*self._at(k * period)[0], *self._at(k * period + self.lead)[1]] for k in samples]
         sizes = [max(0.0, *(floor(x.abs_lower()) for x in column)) for column in zip(*wanted, strict=True)]
