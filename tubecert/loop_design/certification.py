@@ -98,7 +98,6 @@ def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, No
             missed = (remainders.defect > _DEFECT * space_of(remainders)).any()
             return replace(plain, lacks=(lack,)), Notes(missed=fitting(loop) if missed else None)
         checked = check(loop, found.tables, stages, inequalities.recipe)
-        notes = explain(inequalities, stages, found.evaluations)
         over = {lack.where: lack for lack in checked.lacks if lack.kind == "inputs"}
         proposed = replace(plain, controller=found.tables, tube=stages, recipe=inequalities.recipe)
         result = replace(proposed, **checked._asdict())
@@ -108,7 +107,7 @@ def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, No
             0.98 * own.allowed / own.needed if (own := over.get(name)) and own.allowed and own.needed else 1.0
             for name in loop.model.inputs
         ]
-    return result, notes
+    return result, explain(inequalities, stages, found.evaluations)
 
 
 def _hopeless(remainders: Remainders) -> Iterator[Lack]:
