@@ -87,16 +87,15 @@ def check(
         results = _members(specs, family)
     else:
         files = list(dict.fromkeys(file for path in specs for file in _below(path)))
-        others = [
-            file for file in files if (skip_others or file not in specs) and not _is_specification(file)
-        ]
+        named = set() if skip_others else {*specs}
+        others = dict.fromkeys(file for file in files if file not in named and not _is_specification(file))
         files = [file for file in files if file not in others]
         options = CheckOptions(
             certify=certify, strict=strict, cached=not no_cache, settings=tuple(settings), gap=gap
         )
         options = options if budget is None else replace(options, budget=budget)
         results = _checked(files, options, how, scheduler, jobs) if files else []
-        results = [*results, *_skipped(others)] or _nothing(specs)
+        results = [*results, *_skipped([*others])] or _nothing(specs)
     form = format_ or ("json" if how.json else "github" if github.detected() else "text")
     write_stdout(written(form, results, Terminal.stdout(color=how.color), quiet=how.quiet))
     keeper.tell({"said": True})
