@@ -31,7 +31,6 @@ def compare(
     if how.json and format_ not in ("text", "json"):
         refuse("--format", "", "--json and --format exclude each other")
     from tubecert.library import comparing
-    from tubecert.report.comparison import page_of
 
     if certificates.count(STDIN) > 1:
         raise refused("- is given twice: one certificate can be on stdin", "give files")
@@ -46,4 +45,4 @@ def compare(
         write_stdout(getattr(comparison, "json" if how.json else format_))
         return
     written = [*(("page", target) for target in output), ("more", "-v here; -o FILE.html")]
-    present(how, page_of(comparison.sides), written)
+    present(how, comparison._page(), written)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -50,7 +51,7 @@ def verify(
     **asked: Any,
 ) -> ExitCode:
     """Decide C1, C2, C3 of metrics on their safe sets, without plan, uncertainty or tube."""
-    from tubecert.report import progress, text, verification
+    from tubecert.report import progress, verification
 
     cases = list(_cases(files, asked.get("rate"), settings))
     if output is not None:
@@ -58,7 +59,6 @@ def verify(
             raise refused(f"-o takes one metric, and {len(cases)} were given", "verify them one by one")
         certificate.check_target(output)
         spare(output, {"input": cases[0][0], "specification": cases[0][1].path})
-    shown = Terminal.stdout(color=how.color)
     found: list[VerifiedMetric] = []
     for file, spec in cases:
         with telling.shown(how) as show:
@@ -66,8 +66,7 @@ def verify(
             found.append(metrics.verify(Specification(spec=spec), **asked, progress=told))
         if not how.json:  # one after the other: many metrics take their time
             page = verification.page_of(file, found[-1].found)
-            one = [text.headline(page)] if how.quiet else text.screen(page, [], verbose=True)
-            write_stdout(shown.text(one))
+            write_stdout(telling.text_of(replace(how, verbose=True), page, []))
     if output is not None and found[0].proven:
         found[0].save(output)
     if how.json:
