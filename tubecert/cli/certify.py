@@ -12,9 +12,8 @@ from tubecert import certificate
 from tubecert.asking import SETTINGS, SPEC, Text, words_of
 from tubecert.cli import keeper, telling
 from tubecert.cli.adapter import Output, command
-from tubecert.cli.export import folder_of
 from tubecert.cli.report import check_pages
-from tubecert.cli.telling import plan_of, refused, spare
+from tubecert.cli.telling import plan_of, refused, spare, stem_of
 from tubecert.digits import exact
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.files import read
@@ -93,7 +92,7 @@ def _next(found: Certification | SampledCertification, spec: Spec, target: str) 
         yield "next", f"tubecert recheck {name}"
         yield "", f"tubecert simulate {shlex.quote(spec.path)} --certificate {name}"
     if found.certified and exported:
-        yield "", f"tubecert export {name} -o {shlex.quote(folder_of(target))}"
+        yield "", f"tubecert export {name} -o {shlex.quote(f'{stem_of(target)}.controller')}"
     else:
         yield "more", f"-v here; tubecert report {name}: a page with figures"
 
@@ -116,7 +115,7 @@ def _kept_place(file: str, system: Spec, beside: str, *, synthesised: bool) -> s
     spare(beside, {"plan": plan})
     if beside == certificate.STDOUT or not synthesised or system.metric or system.synthesis is None:
         return None
-    target = str(Path(folder_of(beside)).with_suffix(".metric.json"))
+    target = str(Path(f"{stem_of(beside)}.metric.json"))
     certificate.check_target(target)
     spare(target, {"specification": file, "plan": plan})
     if Path(target).exists() and not _by_tubecert(target):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from tubecert.asking import CERTIFICATE, Text
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
+from tubecert.cli.telling import stem_of
 from tubecert.printable import visible
 
 _WORDS = {
@@ -20,14 +21,9 @@ def export(how: Output, certificate: str, *, output: str | None = None) -> None:
     """Write the controller that a certificate of a sampled loop is about: C99, with its data and a self-test."""
     from tubecert.library import exporting
 
-    found = exporting.export(certificate, output or folder_of(certificate))
+    found = exporting.export(certificate, output or f"{stem_of(certificate)}.controller")
     if not how.quiet:
         write_stdout(
             f"{visible(found.folder)}: {', '.join(found.files)}\n"
             f"  {found.work} multiply-adds a sample; README.txt says how to compile and what is covered\n"
         )
-
-
-def folder_of(certificate: str) -> str:
-    """Where the controller of a certificate goes: `plant.controller` for `plant.certificate.json`, beside it."""
-    return certificate.removesuffix(".json").removesuffix(".certificate") + ".controller"

@@ -1,4 +1,4 @@
-"""`report`: a certificate in, pages out. Also what `certify --report` checks before it works, and writes after."""
+"""`report`: a certificate in, pages out. Also what `certify --report` checks before it works."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tubecert.asking import CERTIFICATE, Text, words_of
 from tubecert.certificate.file import check_target, same_file
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.telling import refused
+from tubecert.cli.telling import refused, stem_of
 from tubecert.files import STDIN
 from tubecert.library import pages
 from tubecert.library.reading import read
@@ -68,5 +68,4 @@ def check_pages(targets: Sequence[str], taken: Mapping[str, str | None]) -> None
 def _beside(source: str) -> str:
     """`plant.html` for `plant.certificate.json`, in the same folder."""
     path = Path(source)
-    name = path.name.removesuffix(".json").removesuffix(".certificate")
-    return str(path.with_name(f"{name or 'certificate'}.html")) if path.name else source
+    return str(path.with_name(f"{stem_of(path.name) or 'certificate'}.html")) if path.name else source
