@@ -43,8 +43,6 @@ from tubecert.errors import ExitCode
 from tubecert.printable import visible
 
 Run: TypeAlias = Callable[..., ExitCode | None]
-
-
 OUTPUT: Final[Words] = {
     "verbose": Flag("Also show the constants and all assumptions.", short="-v"),
     "quiet": Flag("Only the verdict.", short="-q"),
@@ -187,7 +185,7 @@ def with_options(run: Callable[..., None], words: Words, *, version: bool) -> Ca
 
 
 def _parameter(name: str, kind: Kind) -> inspect.Parameter:
-    default, value = _typed(name, kind)
+    default, value = _typed(kind)
     metavar = f"<{'|'.join(kind.words)}>" if isinstance(kind, Choice) and not kind.place else kind.metavar
     names = filter(None, (kind.called or flag(name), kind.short))
     option: Any = (
@@ -204,7 +202,7 @@ def _parameter(name: str, kind: Kind) -> inspect.Parameter:
     )
 
 
-def _typed(name: str, kind: Kind) -> tuple[Any, Any]:
+def _typed(kind: Kind) -> tuple[Any, Any]:
     """The default and the type of an option: texts, but for flags and choices."""
     if isinstance(kind, Flag):
         return kind.default, bool

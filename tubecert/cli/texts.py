@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from importlib import resources
 from typing import Final
@@ -14,6 +13,7 @@ from tubecert.errors import SpecError
 from tubecert.expression import near
 from tubecert.findings import Finding
 from tubecert.libraries import versions
+from tubecert.printable import json_text
 from tubecert.release import __version__
 from tubecert.report import pages
 
@@ -59,6 +59,6 @@ def version(how: Output) -> None:
     """Show the version; with -v, also those of Python and of the libraries that results rest on."""
     shown = versions() if how.verbose or how.json else {"tubecert": __version__}
     if how.json:
-        write_stdout(json.dumps(shown, indent=1) + "\n")
+        write_stdout(json_text(shown))
     else:
         write_stdout("".join(f"{name} {own}\n" for name, own in shown.items()))
