@@ -308,9 +308,9 @@ def wanted_of(
         asking.refuse(
             asking.named("objective"), best, f"the objective {best} needs {asking.named('rate')}, in 1/s"
         )
-    if solver is not None and said.setdefault("solver", solver_name(solver)) is None:
+    if solver is not None:
         known = "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows"
-        asking.refuse(asking.named("solver"), solver, known)
+        said["solver"] = solver_name(solver) or asking.refuse(asking.named("solver"), solver, known)
     if variables is not None:
         said["variables"] = variables
         if strange := [name for name in variables if name not in system.states]:
