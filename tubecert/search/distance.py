@@ -157,11 +157,9 @@ class DistanceSearch(GainSearch[DistanceRecipe]):
         """Deta/e squared, for the largest e that is admitted."""
         return least_rate(self.problem, self.n, omega, g)[0]
 
-    def predictors(self, bandwidths: Sequence[Fraction]) -> list[Fraction]:
+    def best(self, bandwidths: Sequence[Fraction]) -> list[Fraction]:
         """At the e of least Gamma."""
-        if (given := self.problem.predictor_gain) is not None:
-            return [given] * len(bandwidths)
-        errors = least_rate(self.problem, self.n, np.array([float(w) for w in bandwidths]))[1]
+        errors = least_rate(self.problem, self.n, np.array(bandwidths, dtype=float))[1]
         return [self._predictor(w, e) for w, e in zip(bandwidths, errors, strict=True)]
 
     def _predictor(self, omega: Fraction, e: float) -> Fraction:

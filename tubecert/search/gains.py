@@ -6,7 +6,7 @@ In floats. Nothing here is proven: recipes are proposed, and the kernel decides 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import ClassVar, Final, Generic, TypeVar
 
@@ -59,8 +59,8 @@ class GainSearch(ABC, Generic[L]):
         """The least Gamma per bandwidth (lanes,), infinite where none serves; `g`: predictors in place of the best."""
 
     @abstractmethod
-    def predictors(self, bandwidths: Sequence[Fraction]) -> list[Fraction]:
-        """The predictor gain at each printed bandwidth: the one given, or the best one to 4 digits."""
+    def best(self, bandwidths: Sequence[Fraction]) -> list[Fraction]:
+        """The best predictor gain at each printed bandwidth, to 4 digits."""
 
     @abstractmethod
     def made(self, gains: Sequence[Gains]) -> tuple[L, ...]:
@@ -70,10 +70,15 @@ class GainSearch(ABC, Generic[L]):
     def propose(self, asked: Asked) -> Proposal[L]:
         """What the search hands over."""
 
+    def predictors(self, bandwidths: Sequence[Fraction]) -> list[Fraction]:
+        """The predictor gain at each printed bandwidth: the one given, or the best one."""
+        given = self.problem.predictor_gain
+        return self.best(bandwidths) if given is None else [given] * len(bandwidths)
+
     def printed(self, bandwidths: Sequence[Fraction]) -> list[Gains]:
         """The gains at printed bandwidths: g first, then Gamma for the printed g, rounded up; where there is one."""
         gains = self.predictors(bandwidths)
-        Gamma = self.needed(_floats(bandwidths), _floats(gains))
+        Gamma = self.needed(np.array(bandwidths, dtype=float), np.array(gains, dtype=float))
         return [
             (w, round_up(max(float(G) * (1 + SLACK), 1e-12), DIGITS), g)
             for w, G, g in zip(bandwidths, Gamma, gains, strict=True)
@@ -122,10 +127,6 @@ class GainSearch(ABC, Generic[L]):
         own = recipe.bandwidth
         omegas = sorted({own, *(round_up(float(own) * float(factor), DIGITS) for factor in _AROUND)})
         return self.made([(omega, recipe.adaptation_rate, recipe.predictor_gain) for omega in omegas])
-
-
-def _floats(values: Iterable[Fraction]) -> Array:
-    return np.array([float(value) for value in values])
 
 
 # -- one-dimensional searches, many at once; functions take arrays with the grid along the first axis

@@ -102,13 +102,9 @@ class RateSearch(GainSearch[RateRecipe]):
         k = self.n.DBpx * self.terms.speed / self.n.DBp + 2 * omega
         return np.fmax((np.sqrt(r * (r + 8.0 * k)) - r) / 4.0, 1e-3 * omega)
 
-    def predictors(self, bandwidths: Sequence[Fraction]) -> list[Fraction]:
+    def best(self, bandwidths: Sequence[Fraction]) -> list[Fraction]:
         """One at a time."""
-        given = self.problem.predictor_gain
-        return [
-            round_up(float(self._best(np.asarray(float(w)))), DIGITS) if given is None else given
-            for w in bandwidths
-        ]
+        return [round_up(float(self._best(np.asarray(float(w)))), DIGITS) for w in bandwidths]
 
     def made(self, gains: Sequence[Gains]) -> tuple[RateRecipe, ...]:
         """A recipe is its gains."""
