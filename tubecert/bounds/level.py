@@ -78,10 +78,9 @@ def greatest_level(
     for k in range(_ROUNDS):
         found = settled(suprema, safe_set, now)
         if found.lower is None or found.sides is None:
-            share = None if best is not None else _narrower(suprema.model.states, found)
-            if share is None or found.sides is None:
+            if best is not None or (narrower := _narrower(suprema.model.states, found, k)) is None:
                 return best or found
-            now = Proposed(rho=found.rho, sides=found.sides).scaled(share * (1 - _added(k)))
+            now = narrower
             continue
         sides = (*found.sides, *_of_outputs(suprema, found, asked[len(found.sides) :]))
         room = min(w / side for w, side in zip(asked, sides, strict=True) if w is not None)
@@ -94,12 +93,13 @@ def greatest_level(
     return best or replace(found, lower=None, upper=None, obstacle="not_settled")
 
 
-def _narrower(states: Sequence[str], found: Radius) -> Fraction | None:
-    """By what factor a tube that leaves the safe set has to shrink; None if that would not help."""
+def _narrower(states: Sequence[str], found: Radius, k: int) -> Proposed | None:
+    """A tube that leaves the safe set, as narrow as that is around the plan; None if that would not help."""
     contained = found.contained
     if contained.verdict is Verdict.CERTIFIED or found.sides is None or contained.room <= 0:
         return None
-    return contained.room / found.sides[states.index(contained.state)]
+    share = contained.room / found.sides[states.index(contained.state)]
+    return Proposed(rho=found.rho, sides=found.sides).scaled(share * (1 - _added(k)))
 
 
 def settled(suprema: Suprema, safe_set: Box, proposed: Proposed) -> Radius:

@@ -172,10 +172,10 @@ def _lowered(problem: TubeProblem, least: Mapping[str, float]) -> TubeProblem:
     """The problem with constants as low as they may turn out to be."""
 
     def of(record: R) -> R:
-        own = {name: value for name, value, _ in record.items() if name in least}
         changes = {
             name.removeprefix(record.prefix): Constant(below=min(value.below, least[name]), above=least[name])
-            for name, value in own.items()
+            for name, value, _ in record.items()
+            if name in least
         }
         return replace(record, **changes)
 

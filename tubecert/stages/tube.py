@@ -23,13 +23,7 @@ from tubecert.claims.advice import (
     ReduceInitialError,
 )
 from tubecert.claims.family import Claim, Relax, Side
-from tubecert.claims.statements import (
-    PlanBounded,
-    PlanInSafeSet,
-    StartInTube,
-    TubeInSafeSet,
-    TubeRadius,
-)
+from tubecert.claims.statements import PlanBounded, PlanInSafeSet, StartInTube, TubeInSafeSet, TubeRadius
 from tubecert.coordinates import Coordinates
 from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.enclosure.interval import Interval, sqrt

@@ -1,8 +1,8 @@
 """Semidefinite programs, straight to a conic solver.
 
-Minimise c'y subject to S_0 + sum_k y_k S_k >= 0 for every block. All slopes are
-sparse and nothing is canonicalised, so that the wall time is the solver's own. Clarabel runs on one thread with fixed
-settings; SCS, for cross-checks, and every other solver are reached through cvxpy.
+Minimise c'y subject to S_0 + sum_k y_k S_k >= 0 for every block. All slopes are sparse and nothing is
+canonicalised, so that the wall time is the solver's own. Clarabel runs on one thread with fixed settings; SCS, for
+cross-checks, and every other solver are reached through cvxpy.
 Untrusted: what comes back is a proposal with an opinion, never a verdict.
 
 A program for cvxpy has one constraint for each of its parts. What a solver says of its work comes back as its status:

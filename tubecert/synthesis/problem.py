@@ -25,7 +25,6 @@ class SynthesisProblem:
       measured by its size in these coordinates;
     - N'(-d_f W + f_x W + W f_x' + 2 rate W)N <= 0, N = B_perp(x); `rate` in 1/s, any margin included.
 
-
     I is meant in the `coordinates`, which are made of the `half_widths` (without any, of those of the safe set). W and
     the rate of `model` are not used. Above `limit` the answer is of no use, and after so many `rounds` none is asked
     for. `sharp`: kappa is wanted to .1 %. `progress` is told a route's steps.
