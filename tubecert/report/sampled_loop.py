@@ -44,16 +44,14 @@ _LAW: Final = (
 
 def page_of(certificate: Certificate, simulated: Simulated | None = None, *, all_of_it: bool = True) -> Page:
     """The page of a certificate, whatever its verdict; or its first section alone, for which nothing is drawn."""
-    result, sections = certificate.result, _sections(certificate, simulated)
-    own = result.spec.effective
-    found = (Section(key=key, title=title, blocks=tuple(blocks)) for key, title, blocks in sections)
+    result, sections = certificate.result, Section.each(_sections(certificate, simulated))
     return Page(
-        name=own.name,
+        name=result.spec.effective.name,
         verdict=result.verdict,
         summary=promise(result),
         meaning=_meaning(result),
         caveat=NOT_RECHECKED,
-        sections=tuple(islice((each for each in found if each.blocks), None if all_of_it else 1)),
+        sections=tuple(islice(sections, None if all_of_it else 1)),
     )
 
 
@@ -67,7 +65,7 @@ def _sections(
     yield "figures", "Figures", [Figures(figures=drawn)] if drawn else []
     widths = [_widths(result, own.system.states, notes)] if result.tube else []
     yield "tube", "Half-widths, and what fills them", widths
-    yield "simulation", "Simulation", [] if simulated is None else simulated_blocks(simulated)
+    yield "simulation", "Simulation", simulated_blocks(simulated)
     yield "assumed", "Assumed, not proven", [Items(items=tuple(assumed(result)))]
     yield "system", "The specification", [*system(own, result.spec.settings), *_law(own)]
     yield "origin", "Where it comes from", [_origin(certificate)]
