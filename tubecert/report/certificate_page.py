@@ -20,7 +20,6 @@ from tubecert.records import to_json
 from tubecert.report import claimed, reach
 from tubecert.report.certificate_brief import first_blocks, reasons
 from tubecert.report.figures_gains import trade_off
-from tubecert.report.figures_scene import labelled
 from tubecert.report.figures_tube import input_figures, state_figures, tube_figures
 from tubecert.report.gains import NAMES, Gains, deciding, rows
 from tubecert.report.outline import level_set, widths
@@ -227,7 +226,7 @@ def _inputs(result: Result) -> Iterator[Block]:
 def _input_rows(result: Result) -> Iterator[tuple[str, ...]]:
     """An input with every kind that bounds it, in their order; one row without any if there is none."""
     for own in result.inputs:
-        name, limits = labelled(own.input, result.spec.effective.system), reach.ends_of(own.limits)
+        name, limits = claimed.labelled(own.input, result.spec.effective.system), reach.ends_of(own.limits)
         first = name, limits, own.verdict, reach.span_of(own.plan.least.below, own.plan.greatest.above)
         for key in (key for key in NAMES if key in own.bounds):
             bound = own.bounds[key]

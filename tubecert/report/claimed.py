@@ -70,6 +70,12 @@ def place(states: Sequence[str], at: Witness) -> str:
     return ", ".join(parts)
 
 
+def labelled(name: str, system: SystemView, words: str = "") -> str:
+    """A state or an input, or `words` about it, with its unit, if it has one."""
+    unit = system.units.get(name, "")
+    return f"{words or name} ({unit})" if unit else words or name
+
+
 def size(bound: Fraction) -> str:
     """A half-width or a deviation, rounded up; what is as good as nothing is said in one way."""
     return f"< {short(NOTHING)}" if 0 < bound < NOTHING else up(bound)

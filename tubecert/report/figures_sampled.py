@@ -13,8 +13,9 @@ from typing import Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
+from tubecert.report.claimed import labelled
 from tubecert.report.figures_axes import BOTTOM, TOP, Axis, Chart, Point
-from tubecert.report.figures_scene import Plane, labelled, over_time
+from tubecert.report.figures_scene import Plane, over_time
 from tubecert.sampled_loop.record import Certificate, Result, Shares
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import SHARES, WITH_WIND, causes, percents
@@ -107,7 +108,7 @@ def _deviations(result: Result) -> Iterator[Chart]:
         widths = np.repeat([float(stage.half_widths[name]) for stage in result.tube], 2)
         wish = effective.tube.half_widths.get(name)
         limits, off = None if wish is None else (-float(wish), float(wish)), f"{name} - {name}*"
-        label, words = labelled(name, effective.system).replace(name, off, 1), ("wish", told)
+        label, words = labelled(name, effective.system, off), ("wish", told)
         sides = -widths, widths
         yield over_time(
             f"deviation-{i}", off, label, (t, 0 * t), band=sides, limits=limits, words=words, proven=proven

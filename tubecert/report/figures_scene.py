@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tubecert.certificate.effective import Effective, ObstacleView, SystemView
+from tubecert.certificate.effective import Effective, ObstacleView
 from tubecert.enclosure.interval import Array
+from tubecert.report.claimed import labelled
 from tubecert.report.figures_axes import (
     BOTTOM,
     HEIGHT,
@@ -68,12 +69,6 @@ def is_near(shown: Array, safe: Point) -> bool:
 def view(shown: Array, safe: Point, label: str, *, near: bool) -> Axis:
     """An axis that shows some values, with or without the safe range."""
     return Axis.around([*shown, *safe] if near else shown, label, pad=0.06 if near else 0.25)
-
-
-def labelled(name: str, system: SystemView) -> str:
-    """A state or an input with its unit, if it has one."""
-    unit = system.units.get(name, "")
-    return f"{name} ({unit})" if unit else name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

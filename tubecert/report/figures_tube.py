@@ -13,9 +13,9 @@ import numpy as np
 from tubecert.certificate.result import InputData, Result
 from tubecert.enclosure.interval import Array
 from tubecert.report import planned
-from tubecert.report.claimed import point
+from tubecert.report.claimed import labelled, point
 from tubecert.report.figures_axes import Chart, Point
-from tubecert.report.figures_scene import Plane, labelled, over_time
+from tubecert.report.figures_scene import Plane, over_time
 from tubecert.report.outline import tube_outline, widths
 
 

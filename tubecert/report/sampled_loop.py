@@ -12,7 +12,7 @@ from typing import Final
 
 from tubecert.certificate.effective import Effective
 from tubecert.digits import near, up
-from tubecert.report.claimed import NOT_RECHECKED, ends, size, started
+from tubecert.report.claimed import NOT_RECHECKED, ends, labelled, size, started
 from tubecert.report.figures_sampled import figures, period
 from tubecert.report.page import Block, Cell, Facts, Figures, Items, Listing, Page, Section, Table
 from tubecert.report.page_origin import check_again, system
@@ -115,7 +115,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
     named = (*names, *(system.inputs if notes else ()))
     columns = [["tube" if result.verdict is Verdict.CERTIFIED else "not proven"]]
-    columns[0] += [f"{name} ({system.units[name]})" if system.units.get(name) else name for name in named]
+    columns[0] += [labelled(name, system) for name in named]
     for stages in filter(None, (result.tube, result.tube[1:][-1:])):  # what is never left, and the long run
         bounds = [{**stage.half_widths, **stage.deviations} for stage in stages]
         widths = (size(max(own[name] for own in bounds)) for name in named)
