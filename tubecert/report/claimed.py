@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -68,6 +68,12 @@ def place(states: Sequence[str], at: Witness) -> str:
     parts = [] if at.t is None else [f"t = {short(at.t, 6)} s"]
     parts += [f"{name} = {short(value, 6)}" for name, value in zip(states, at.x, strict=False)]
     return ", ".join(parts)
+
+
+def box(sides: Mapping[str, Sequence[Fraction | str]]) -> str:
+    """`x in [-1, 1], ...`, as it is declared."""
+    told = ((name, end(Fraction(low)), end(Fraction(high))) for name, (low, high) in sides.items())
+    return ", ".join(f"{name} in [{low}, {high}]" for name, low, high in told)
 
 
 def labelled(name: str, system: SystemView, words: str = "") -> str:

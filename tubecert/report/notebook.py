@@ -6,9 +6,10 @@ In: pages. Out: HTML that stands for itself. The template escapes every text.
 from __future__ import annotations
 
 from tubecert.certificate.effective import Effective
+from tubecert.report.claimed import box
 from tubecert.report.html import environment
 from tubecert.report.page import Facts, Listing, Page, Section
-from tubecert.report.page_origin import equations, safe_set
+from tubecert.report.page_origin import equations
 
 
 def of_page(page: Page) -> str:
@@ -18,7 +19,8 @@ def of_page(page: Page) -> str:
 
 def specification(effective: Effective) -> str:
     """The card of a specification: its equations and its safe set."""
-    blocks = Listing(text="\n".join(equations(effective))), Facts.of([("safe set", safe_set(effective))])
+    safe = box(effective.system.ordered(effective.part("safe_set")))
+    blocks = Listing(text="\n".join(equations(effective))), Facts.of([("safe set", safe)])
     system = Section(key="system", title="System", blocks=blocks)
     page = Page(
         name=effective.name,

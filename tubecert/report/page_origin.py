@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from tubecert.certificate.effective import Effective, TableView
-from tubecert.digits import end, exact
+from tubecert.digits import exact
 from tubecert.records import to_json
+from tubecert.report.claimed import box
 from tubecert.report.page import Block, Facts, Listing, Words
 from tubecert.words.sampled_loop import family
 
@@ -58,7 +58,7 @@ def _facts(effective: Effective, overrides: Mapping[str, object]) -> Iterator[tu
         yield f"table {name}", _points(table)
     if model.units:
         yield "units", ", ".join(f"{name}: {unit}" for name, unit in sorted(model.units.items()))
-    yield "safe set", safe_set(effective)
+    yield "safe set", box(model.ordered(effective.part("safe_set")))
     if bounds := effective.uncertainty.bounds:
         yield "bounds declared", _list(bounds)
     told, any_of = effective.part("trajectory"), effective.trajectory.kind == "any"
@@ -72,12 +72,6 @@ def _facts(effective: Effective, overrides: Mapping[str, object]) -> Iterator[tu
         yield "obstacle", _list(obstacle)
     if overrides:
         yield "overridden by the command", _list(overrides)
-
-
-def safe_set(effective: Effective) -> str:
-    """The box that the tube is to stay in: `x in [-1, 1], ...`."""
-    sides = effective.system.ordered(effective.part("safe_set")).items()
-    return ", ".join(f"{name} in [{', '.join(end(Fraction(at)) for at in ends)}]" for name, ends in sides)
 
 
 def _points(table: TableView) -> str:

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 from tubecert.claims.advice import advice
-from tubecert.digits import down, end, exact, short, up
+from tubecert.digits import down, exact, short, up
 from tubecert.expression import free_symbols, parse, symbol
-from tubecert.report.claimed import place
+from tubecert.report.claimed import box, place
 from tubecert.report.page import Block, Facts, Items, Page, Section, Table, Words
 
 if TYPE_CHECKING:
@@ -84,8 +84,7 @@ def _first(data: SearchData, file: MetricFile | None, states: Sequence[str]) -> 
 
 
 def _proven(file: MetricFile) -> Iterator[tuple[str, str]]:
-    sides = (f"{name} in [{end(low)}, {end(high)}]" for name, (low, high) in file.verified_on.items())
-    yield "proven on", f"{', '.join(sides)}: C1 and C2 by branch and bound, C3 exactly"
+    yield "proven on", f"{box(file.verified_on)}: C1 and C2 by branch and bound, C3 exactly"
     bounds = f"{down(1 / file.upper.above)} I <= W <= {up(1 / file.lower.below)} I"
     yield "W", f"{bounds}; W {_kind(file)}, {file.solver.digits} digits ({file.solver.route})"
 

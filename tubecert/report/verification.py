@@ -9,11 +9,11 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from tubecert.claims.statements import MetricKilling
-from tubecert.digits import down, end, exact, up
+from tubecert.digits import down, exact, up
 from tubecert.enclosure.constant import Constant
 from tubecert.printable import printable_json
 from tubecert.records import Json, to_json
-from tubecert.report.claimed import place
+from tubecert.report.claimed import box, place
 from tubecert.report.page import Facts, Page, Section
 
 if TYPE_CHECKING:
@@ -36,8 +36,7 @@ def page_of(file: str, found: Verified) -> Page:
 
 
 def _details(found: Verified) -> Iterator[tuple[str, str]]:
-    sides = ", ".join(f"{name} in [{end(lo)}, {end(hi)}]" for name, (lo, hi) in found.safe_set.items())
-    reason = found.reason
+    sides, reason = box(found.safe_set), found.reason
     if reason is None:
         yield "C1 to C3", f"hold on {sides}"
         return
