@@ -230,11 +230,8 @@ def _input_rows(result: Result) -> Iterator[tuple[str, ...]]:
         first = name, limits, own.verdict, reach.span_of(own.plan.least.below, own.plan.greatest.above)
         for key in (key for key in NAMES if key in own.bounds):
             bound = own.bounds[key]
-            span, added = (
-                reach.span_of(bound.least, bound.greatest),
-                (up(bound.feedback), up(bound.adaptation)),
-            )
-            yield (*first, NAMES[key], span, reach.used(own, key), *added)
+            span, used = reach.span_of(bound.least, bound.greatest), reach.used(own, key)
+            yield (*first, NAMES[key], span, used, up(bound.feedback), up(bound.adaptation))
         if not own.bounds:
             yield (*first, *(UNKNOWN,) * 5)
 

@@ -222,12 +222,12 @@ def swept(curve: Array, shape: Array, fine: Array) -> list[Array]:
     Out: for every piece of the curve the hull of the shape at both ends; points that are off the line between others by
     less than `fine` (2,) are left out.
     """
-    known = _corners(curve / fine) if len(curve) > 1 else [0, 0]
-    return [_hull(shape, curve[one], curve[other]) for one, other in pairwise(known)]
+    corners = pairwise(_corners(curve / fine))
+    return [_hull(shape, curve[one], curve[other]) for one, other in corners]
 
 
 def _corners(curve: Array) -> list[int]:
-    """The points that a curve (K, 2) cannot do without, if one may be off by 1."""
+    """The points that a curve (K, 2) cannot do without, if one may be off by 1; its ends are among them."""
     kept, end = [0], 1
     while end < len(curve) - 1:
         inner, along = curve[kept[-1] + 1 : end + 1] - curve[kept[-1]], curve[end + 1] - curve[kept[-1]]

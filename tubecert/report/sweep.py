@@ -133,7 +133,7 @@ def _found(outcome: Certificate | SampledCertificate) -> str:
 def page_of(table: SweepTable, drawn: Sequence[Chart] | None = None) -> Page:
     """The page, with the figures that `figures_sweep` has drawn, if any was asked; the whole table is beside it."""
     keys = ", ".join(f"{axis.path} ({len(axis.texts)} values)" for axis in table.axes)
-    figures = Figures(figures=tuple(drawn or ())) if drawn else Words(text=_NONE_DRAWN)
+    figures = Figures(figures=tuple(drawn)) if drawn else Words(text=_NONE_DRAWN)
     parts = ("points", "Points", [_points(table)]), ("figures", "Figures", [] if drawn is None else [figures])
     return Page(
         name=table.name,
