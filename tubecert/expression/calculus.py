@@ -26,7 +26,9 @@ from tubecert.expression.graph import (
 
 
 def rebuild(e: Expression, args: tuple[Expression, ...]) -> Expression:
-    """The operation of `e` applied to other arguments."""
+    """The operation of `e` applied to other arguments; `e` itself if they are its own."""
+    if args == e.args:
+        return e
     if e.op in FUNCTIONS:
         return FUNCTIONS[e.op](args[0])
     if e.op == "table":
@@ -41,9 +43,7 @@ def rebuild(e: Expression, args: tuple[Expression, ...]) -> Expression:
         return power(args[0], int(str(e.value)))
     if e.op == "norm":
         return norm(args)
-    if e.op == "direction":
-        return direction(args, int(str(e.value)))
-    return e
+    return direction(args, int(str(e.value)))
 
 
 def free_symbols(roots: Iterable[Expression]) -> frozenset[str]:
@@ -59,8 +59,7 @@ def substitute(roots: Iterable[Expression], values: Mapping[str, Expression]) ->
         if node.op == "symbol":
             new[node] = values.get(str(node.value), node)
         else:
-            args = tuple(new[arg] for arg in node.args)
-            new[node] = node if args == node.args else rebuild(node, args)
+            new[node] = rebuild(node, tuple(new[arg] for arg in node.args))
     return [new[root] for root in roots]
 
 

@@ -149,11 +149,10 @@ def root_above(square: Fraction) -> Fraction:
 
 def _nearly(e: Expression) -> Fraction:
     """A number made of rationals and pi with 75 digits of pi; raises `ZeroDivisionError` if it has no value then."""
-    values: dict[Expression, Expression] = {}
+    found: dict[Expression, Expression] = {graph.PI: graph.constant(_NEAR_PI)}
     for node in topological([e]):
-        own = graph.constant(_NEAR_PI) if node.op == "pi" else node
-        values[node] = rebuild(node, tuple(values[each] for each in node.args)) if node.args else own
-    return values[e].fraction
+        found.setdefault(node, rebuild(node, tuple(found[each] for each in node.args)))
+    return found[e].fraction
 
 
 def _rounded(e: Expression, side: Side) -> Fraction:

@@ -39,7 +39,7 @@ def frequencies(h: Iterable[Expression], time: str) -> Frequencies | None:
     roots = list(h)
     for node in topological(roots):
         args = tuple(replaced[arg] for arg in node.args)
-        replaced[node] = node if args == node.args else rebuild(node, args)
+        replaced[node] = rebuild(node, args)
         if node.op in ("sin", "cos", "tan") and time in free_symbols(
             args
         ):  # a wave of waves is as long as they are
