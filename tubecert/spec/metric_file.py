@@ -72,8 +72,8 @@ def with_metric(spec: Spec, path: str, rate: Fraction | None = None) -> Spec:
 
     Raises `TargetError` if the file cannot be read, `SpecError` with every problem in it.
     """
-    if is_of_coefficients(path):
-        return with_metric_text(spec, metric_text(path, spec, rate), path)
+    if _is_of_coefficients(path):
+        return with_metric_text(spec, _metric_text(path, spec, rate), path)
     return _with(spec, read_source(path, METRIC))
 
 
@@ -116,7 +116,7 @@ def _read(root: Field, spec: Spec) -> Metric | None:
     return None if values is None else Metric(**values)
 
 
-def metric_text(path: str, spec: Spec, rate: Fraction | None) -> str:
+def _metric_text(path: str, spec: Spec, rate: Fraction | None) -> str:
     """The text of a metric file for the specification's states; raises `SpecError` for what is no such file."""
     file = _File(path, spec)
     content = _READERS[Path(path).suffix.lower()](file)
@@ -129,16 +129,16 @@ def metric_text(path: str, spec: Spec, rate: Fraction | None) -> str:
     each, n = list(zip(blocks, monomials, strict=True)), range(file.n)
     rows = [[_sum((block[min(i, j)][max(i, j)], own) for block, own in each) for j in n] for i in n]
     text = own_rate if rate is None else number_text(rate)
-    return json.dumps({"format": "tubecert-metric/1", "rate": text, "dual_metric": rows})
+    return json.dumps({"format": FORMAT, "rate": text, "dual_metric": rows})
 
 
-def is_of_coefficients(path: str, data: bytes | None = None) -> bool:
+def _is_of_coefficients(path: str) -> bool:
     """Whether a file is one of these: by its name, and a JSON file by what it holds."""
     suffix = Path(path).suffix.lower()
     if suffix != ".json":
         return suffix in _READERS
     try:
-        content = json.loads(read(path, _KIND) if data is None else data)
+        content = json.loads(read(path, _KIND))
     except (ValueError, RecursionError):
         return False
     return isinstance(content, dict) and "coefficients" in content

@@ -19,7 +19,7 @@ from tubecert.expression import (
     Obligation,
     Parsed,
     constant,
-    derivatives,
+    derivative,
     free_symbols,
     is_name,
     rates_of,
@@ -349,7 +349,7 @@ def _with_outputs(names: Names, field: Field | None, taken: dict[str, str]) -> N
 def _linear(name: str, term: Term, names: Names) -> Output | None:
     """The coefficients, where the term is a sum of states times rational numbers."""
     e = term.expression
-    slopes = [derivatives([e], state)[0] for state in names.states]
+    slopes = [derivative(e, state) for state in names.states]
     if term.obligations or not all(slope.is_constant for slope in slopes):
         return None
     if all(slope is ZERO for slope in slopes) or substitute([e], dict.fromkeys(names.states, ZERO)) != [ZERO]:

@@ -248,10 +248,10 @@ _NO_RANGES: Final = ("verdict", "metric", WIDTHS)
 
 def read_expectation(field: Field | None, names: Names, *, alone: bool) -> Expectation | None:
     """Locked results: verdicts, and [least, most] of numbers of the certificate; `alone`: of a metric alone."""
-    for name in EXPECT.keys.keys() - _ALONE if alone and field else ():
-        if own := field and field.get(name):
-            message = f"{own.path} in a question about a metric alone"
-            help = f"write metric: {', '.join(METRICS.values())}; the number that can be expected is largest_rate"
-            own.fail(codes.RANGE, message, help)
+    others = [field.get(name) for name in EXPECT.keys if name not in _ALONE] if alone and field else []
+    for own in filter(None, others):
+        message = f"{own.path} in a question about a metric alone"
+        help = f"write metric: {', '.join(METRICS.values())}; the number that can be expected is largest_rate"
+        own.fail(codes.RANGE, message, help)
     found: Expectation | None = EXPECT.read(field, names)
     return found
