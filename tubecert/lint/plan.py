@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -92,7 +92,7 @@ def held(spec: Spec) -> Iterator[Finding]:
     if not plan.about:
         return
     x, u = ([term.expression.fraction for term in terms] for terms in (plan.x, plan.u))
-    point, inputs = (f"[{', '.join(near(float(own), 4) for own in each)}]" for each in (x, u))
+    point, inputs = (_listed(each, 4) for each in (x, u))
     pairs = zip(spec.states, x, plan.about, strict=True)
     moved = [f"{name} by {near(float(own - at), 2)}" for name, own, at in pairs if own != at]
     given = "near" if "trajectory.near" in spec.locations else "the middle of the safe set"
@@ -187,13 +187,13 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
         message = f"|f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)"
         if notable:
             message = f"the point is no equilibrium: {message}"
-            exact = f" (at: auto, near: [{', '.join(near(x, 4) for x in curve.x[0])}] is that to 20 digits)"
+            exact = f" (at: auto, near: {_listed(curve.x[0], 4)} is that to 20 digits)"
             exact = exact if near_by.startswith("at") else ""
             help = f"write {near_by or 'at and input with f(at) + B(at) input = 0'}{exact}; {paid(spec)}"
         else:
             room = f"{up(100 * worst / bearable, 2)} % of what the tube has room for"
             message = f"the point is an equilibrium up to a rounding: {message}, {room}"
-            there = f"input: [{', '.join(near(value, 12) for value in curve.u[0])}]"
+            there = f"input: {_listed(curve.u[0], 12)}"
             digits = "" if near_by == there else f"more digits{near_by and f' ({near_by})'}, or "
             help = f"nothing is wrong: the proof counts it in; {digits}expressions (input: [m*g]) help"
         path = "trajectory.input" if "trajectory.input" in spec.locations else "trajectory.at"
@@ -212,8 +212,13 @@ def held_by(spec: Spec) -> str:
     found = equilibrium(Plant(spec.states, spec.inputs, spec.f, spec.B, spec.safe_set), x, u)
     if found is None:
         return ""
-    at, held = (f"[{', '.join(near(float(value), 12) for value in each)}]" for each in found)
+    at, held = (_listed(each, 12) for each in found)
     return f"input: {held}" if found[0] == x else f"at: {at}, input: {held}"
+
+
+def _listed(values: Iterable[Fraction | float], digits: int) -> str:
+    """Numbers in brackets, as a specification has them."""
+    return f"[{', '.join(near(float(value), digits) for value in values)}]"
 
 
 def _bearable(spec: Spec) -> float:

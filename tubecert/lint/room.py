@@ -38,9 +38,8 @@ def least_radius(spec: Spec) -> float:
 def room_findings(spec: Spec, t: Array, x: Array) -> Iterator[Finding]:
     """A tube that leaves the safe set around the plan `x` (K, n) at times `t` (K,), or that the start is not in."""
     offset = _offset(spec, x)
-    if (
-        spec.hardware is not None
-    ):  # the tube is what is found: within wishes and the safe set, with the start in it
+    if spec.hardware is not None:
+        # the tube is what is found: within wishes and the safe set, with the start in it
         sides, most = np.abs(offset) + float(spec.within or 0), _most(spec, x)
         if (sides > most * (1 + _ROUNDING)).any():
             yield _outside(spec, sides, most)
