@@ -179,7 +179,9 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
     scale = 1e-12 * float(largest)
     if not worst > scale:
         return
-    bearable = float(model.rate) * least_radius(spec) if spec.hardware is None else _bearable(spec)
+    # of a machine it is only known what would cross the safe set in a second
+    crossing = float(min(high - low for low, high in spec.safe_set))
+    bearable = float(model.rate) * least_radius(spec) if spec.hardware is None else crossing
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
         states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
@@ -219,11 +221,6 @@ def held_by(spec: Spec) -> str:
 def _listed(values: Iterable[Fraction | float], digits: int) -> str:
     """Numbers in brackets, as a specification has them."""
     return f"[{', '.join(near(float(value), digits) for value in values)}]"
-
-
-def _bearable(spec: Spec) -> float:
-    """A defect in units of the states per s that would cross the safe set in a second, where nothing else is known."""
-    return min(float(high - low) for low, high in spec.safe_set)
 
 
 def _obstacles(spec: Spec, curve: Curve) -> Iterator[Finding]:

@@ -118,9 +118,7 @@ def _offset(spec: Spec, x: Array) -> Array:
     """How far the start is from the plan's, by state: of a box its farthest corner; 0 where it is not said."""
     if spec.within is not None or spec.trajectory.task is not None:
         return np.zeros(len(spec.states))
-    spread = np.array(
-        [(high - low) / 2 for low, high in spec.start_box] or [Fraction(0)] * len(spec.x0), dtype=float
-    )
+    spread = np.array([(high - low) / 2 for low, high in spec.start_box] or 0, dtype=float)
     away = np.array(spec.x0, dtype=float) - x[0]
     return np.asarray(away + np.where(away < 0, -spread, spread))
 
