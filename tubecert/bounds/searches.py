@@ -186,7 +186,7 @@ def lipschitz_constant(h: tuple[Expression, ...], fields: Fields) -> Lipschitz:
     arguments: list[tuple[Expression, ...]] = []
     for node in topological(h):
         args = tuple(plain[arg] for arg in node.args)
-        plain[node] = node if args == node.args else rebuild(node, args)
+        plain[node] = rebuild(node, args)
         if plain[node].op == "norm":
             name = f"norm#{len(back)}"
             back[name] = node
@@ -213,7 +213,7 @@ def _kinks(h: tuple[Expression, ...], fields: Fields) -> Kinks | None:
         elif node.op == "norm":  # as a root it may be differentiated more than once where it is not 0
             plain[node] = sqrt_of(sum((arg * arg for arg in args), start=ZERO))
         else:
-            plain[node] = node if args == node.args else rebuild(node, args)
+            plain[node] = rebuild(node, args)
     if not 0 < len(signs) <= _SIGNS:
         return None
     slopes = fields.by_state(jacobian(tuple(plain[e] for e in h), fields.states))

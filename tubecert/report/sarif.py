@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -13,7 +12,7 @@ from urllib.parse import quote
 
 from tubecert.checking import Checked
 from tubecert.findings import Finding, Location, Severity
-from tubecert.printable import printable_json
+from tubecert.printable import json_text
 from tubecert.release import __version__
 from tubecert.report.pages import codes
 
@@ -35,7 +34,7 @@ def render(results: Sequence[Checked]) -> str:
         "results": list(_results(findings, used)),
     }
     log = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
-    return printable_json(json.dumps(log, indent=1, ensure_ascii=False)) + "\n"
+    return json_text(log)
 
 
 def _rule(code: str) -> dict[str, Any]:

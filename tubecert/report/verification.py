@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from math import isfinite
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 from tubecert.claims.statements import MetricKilling
 from tubecert.digits import down, exact, up
 from tubecert.enclosure.constant import Constant
-from tubecert.printable import printable_json
+from tubecert.printable import json_text
 from tubecert.records import Json, to_json
 from tubecert.report.claimed import box, place
 from tubecert.report.page import Facts, Page, Section
@@ -65,7 +64,7 @@ def _condition(found: Verified) -> str:
 def as_json(found: Sequence[tuple[str, Verified]]) -> str:
     """A list of objects, one for each metric; what was not reached is left out."""
     told = [_data(*each) for each in found]
-    return printable_json(json.dumps(told, indent=1, ensure_ascii=False)) + "\n"
+    return json_text(told)
 
 
 def _data(file: str, found: Verified) -> Json:

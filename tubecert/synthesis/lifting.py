@@ -88,7 +88,7 @@ def lift(expressions: Sequence[Expression], *, opaque: bool = False) -> Lifted:
             new[node] = {"sin": pair[0], "cos": pair[1], "tan": pair[0] / pair[1]}[node.op]
         elif node.op in ("const", "symbol", "add", "mul", "div", "pow"):
             args = tuple(new[arg] for arg in node.args)
-            new[node] = node if args == node.args else rebuild(node, args)
+            new[node] = rebuild(node, args)
         elif opaque:
             name = names.setdefault(node, f"atom#{len(names)}")
             atoms[name] = node
