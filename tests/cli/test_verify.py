@@ -15,7 +15,7 @@ from tubecert.errors import SpecError
 from tubecert.model import build
 from tubecert.pipeline.verification import verify
 from tubecert.spec import load
-from tubecert.spec.metric_file import with_metric
+from tubecert.synthesis.coefficients import with_metric
 from tubecert.verdict import Verdict
 
 SYSTEM = """

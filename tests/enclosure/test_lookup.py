@@ -16,11 +16,11 @@ from tubecert.enclosure.tape import Tape
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ExpressionError, Lookup, derivative, full_text, is_zero, parse, symbol
 from tubecert.expression.graph import table as tabled
+from tubecert.expression.lookup import cubic_slopes, monotone_slopes
 from tubecert.recheck import lookup as balls
 from tubecert.recheck.boxes import Field
 from tubecert.recheck.grammar import read
 from tubecert.recheck.terms import looked_up, slopes, variable
-from tubecert.spec.lookup import cubic_slopes, monotone_slopes
 
 _numbers = st.integers(-60, 60).map(lambda n: Fraction(n, 7))
 

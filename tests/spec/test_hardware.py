@@ -12,7 +12,7 @@ import tubecert
 from tubecert import pipeline
 from tubecert.errors import SpecError
 from tubecert.spec import Hardware, Setting, canonical, load, load_text
-from tubecert.spec.metric_file import with_metric
+from tubecert.synthesis.coefficients import with_metric
 
 ROOT = Path(tubecert.__file__).parents[1]
 CONFIGS = sorted((ROOT / "configs").glob("hardware_*.yaml"))

@@ -23,7 +23,7 @@ from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.pipeline import Listeners, Options, synthesis, synthesised
 from tubecert.spec import Synthesis, load_text
-from tubecert.spec.metric_file import with_metric
+from tubecert.synthesis.coefficients import with_metric
 from tubecert.synthesis.diagnose import uncontrollable_mode
 
 QUICK = settings(max_examples=30, deadline=None)

@@ -21,8 +21,8 @@ from tubecert.expression import is_zero
 from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.spec import load
-from tubecert.spec.metric_file import with_metric
 from tubecert.synthesis import cegis, sos
+from tubecert.synthesis.coefficients import with_metric
 from tubecert.synthesis.diagnose import is_hurwitz, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, invariants, metric_family, suggested
 from tubecert.synthesis.ladder import Ladder, Request, routes, shrunk

@@ -25,8 +25,7 @@ from tubecert.enclosure.objective import Estimate, Target, estimate_of
 from tubecert.enclosure.outward import down, up
 from tubecert.enclosure.taylor import MatrixFunction
 from tubecert.expression import ZERO, Expression, constant, derivatives, substitute, symbol
-from tubecert.expression.matrix import Matrix, column
-from tubecert.spec.algebra import is_positive_semidefinite
+from tubecert.expression.matrix import Matrix, column, is_positive_semidefinite
 from tubecert.tube.sections import enclosed, factor
 
 _LEAST_SHARE = 1e-6

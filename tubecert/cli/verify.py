@@ -22,7 +22,7 @@ from tubecert.progress import Phase
 from tubecert.report.findings import render
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Setting, Spec, load
-from tubecert.spec.metric_file import with_metric
+from tubecert.synthesis.coefficients import with_metric
 
 if TYPE_CHECKING:
     from fractions import Fraction

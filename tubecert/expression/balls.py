@@ -1,4 +1,7 @@
-"""Values of expressions as balls (Arb, `BITS` bits): enclosures, but of tables, which are read at a middle."""
+"""Values of expressions as balls (Arb, `BITS` bits): enclosures, but of tables, which are read at a middle.
+
+And where expressions vanish, by Newton's method in the middles: a proposal.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,16 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
 from tubecert.expression.graph import Expression, topological
+from tubecert.expression.matrix import jacobian
 
 if TYPE_CHECKING:
     from flint import arb
 
 BITS: Final = 300
+_LEFT: Final = Fraction(1, 10**40)  # of the largest slope: what a root may leave
+_DAMPED: Final = Fraction(
+    1, 10**20
+)  # of the same, squared: rows that depend on each other have a least step, too
 
 
 def ball(q: Fraction) -> arb:
@@ -61,3 +69,39 @@ def _value(node: Expression, args: Sequence[arb], point: Mapping[str, arb]) -> a
             return None if at is None else ball(at)
     found: arb = getattr(args[0], node.op)()
     return found
+
+
+def towards_root(
+    roots: Sequence[Expression],
+    names: Sequence[str],
+    start: Sequence[Fraction],
+    size: Sequence[Fraction],
+    *,
+    first: int,
+    steps: int,
+) -> tuple[list[Fraction], bool]:
+    """Where Newton's steps lead, and whether `roots` (n) vanish there but for 40 digits.
+
+    The variables from `first` on move, by equal shares of their `size`; where the roots cannot vanish, to where they
+    are least.
+    """
+    from flint import arb_mat, ctx
+
+    every, n = range(len(names)), len(roots)
+    entries = [*roots, *(slope for row in jacobian(roots, names) for slope in row)]
+    with ctx.workprec(BITS):
+        z, scale = list(map(ball, start)), list(map(ball, size))
+        for _ in range(steps):
+            found = values(entries, dict(zip(names, z, strict=True)))
+            if found is None:
+                break
+            slopes = [[found[n + i * len(names) + j] * scale[j] for j in every] for i in range(n)]
+            steep = max(abs(own).mid() for row in slopes for own in row)
+            if all(abs(own).mid() <= steep * ball(_LEFT) for own in found[:n]):
+                return list(map(middle, z)), True
+            J = arb_mat([row[first:] for row in slopes])
+            damped = arb_mat(n, n, [steep**2 * ball(_DAMPED) * (i == j) for i in range(n) for j in range(n)])
+            step = J.transpose() * (J * J.transpose() + damped).solve(arb_mat([[-own] for own in found[:n]]))
+            for j in every[first:]:
+                z[j] = (z[j] + step[j - first, 0] * scale[j]).mid()
+        return list(map(middle, z)), False

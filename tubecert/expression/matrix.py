@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import combinations
+from typing import TYPE_CHECKING
 
-from tubecert.expression.calculus import derivatives
+from tubecert.expression.calculus import derivatives, free_symbols, substitute
 from tubecert.expression.graph import ONE, ZERO, Expression, constant
+from tubecert.expression.zero import is_zero
+
+if TYPE_CHECKING:
+    from flint import fmpq_mat
 
 Matrix = tuple[tuple[Expression, ...], ...]
 Rows = Sequence[Sequence[Expression]]
 Rationals = Sequence[Sequence[Fraction]]
+_POINTS = 3  # where ranks are tried
+_LARGEST_SYMBOLIC = 4  # columns up to which det(B^T B) is expanded
 
 
 def matrix(rows: Rows) -> Matrix:
@@ -115,10 +124,14 @@ class _Expansion:
 
 
 def _rational(rows: Rationals) -> Fraction:
+    found = _flint(rows).det()
+    return Fraction(int(found.p), int(found.q))
+
+
+def _flint(rows: Rationals) -> fmpq_mat:
     from flint import fmpq, fmpq_mat
 
-    found = fmpq_mat([[fmpq(q.numerator, q.denominator) for q in row] for row in rows]).det()
-    return Fraction(int(found.p), int(found.q))
+    return fmpq_mat([[fmpq(q.numerator, q.denominator) for q in row] for row in rows])
 
 
 def adjugate(a: Rows) -> Matrix:
@@ -133,26 +146,14 @@ def adjugate(a: Rows) -> Matrix:
 
 def null_space(a: Rationals) -> list[list[Fraction]]:
     """A basis of {v : a v = 0} over the rationals, as rows."""
-    rows = [list(row) for row in a]
-    width = len(rows[0])
-    pivots: list[int] = []
-    for j in range(width):
-        place = len(pivots)
-        chosen = next((i for i in range(place, len(rows)) if rows[i][j] != 0), None)
-        if chosen is None:
-            continue
-        rows[place], rows[chosen] = rows[chosen], rows[place]
-        rows[place] = [x / rows[place][j] for x in rows[place]]
-        for i in range(len(rows)):
-            if i != place and rows[i][j] != 0:
-                factor = rows[i][j]
-                rows[i] = [x - factor * y for x, y in zip(rows[i], rows[place], strict=True)]
-        pivots.append(j)
+    reduced, rank = _flint(a).rref()
+    rows = [[Fraction(int(q.p), int(q.q)) for q in row] for row in reduced.tolist()[:rank]]
+    pivots, width = [next(j for j, q in enumerate(row) if q) for row in rows], len(a[0])
     basis = []
     for j in (j for j in range(width) if j not in pivots):
         vector = [Fraction(int(i == j)) for i in range(width)]
-        for i, p in enumerate(pivots):
-            vector[p] = -rows[i][j]
+        for row, pivot in zip(rows, pivots, strict=True):
+            vector[pivot] = -row[j]
         basis.append(vector)
     return basis
 
@@ -160,3 +161,53 @@ def null_space(a: Rationals) -> list[list[Fraction]]:
 def constants(rows: Rationals) -> Matrix:
     """A rational matrix as expressions."""
     return matrix([[constant(x) for x in row] for row in rows])
+
+
+def is_positive_definite(a: Rationals) -> bool:
+    """Whether a symmetric matrix is positive definite."""
+    return is_positive_semidefinite(a) and not null_space(a)
+
+
+def is_positive_semidefinite(a: Rationals) -> bool:
+    """Whether a symmetric matrix is positive semidefinite: no pivot is negative, and a zero one has a zero row."""
+    rows = [list(row) for row in a]
+    for k, row in enumerate(rows):
+        if row[k] < 0 or (row[k] == 0 and any(row[k:])):
+            return False
+        for below in rows[k + 1 :] if row[k] else []:
+            ratio = below[k] / row[k]
+            below[k:] = [b - ratio * r for b, r in zip(below[k:], row[k:], strict=True)]
+    return True
+
+
+def dependent_columns(a: Rows) -> bool:
+    """Whether the columns are *proven* to be dependent at every point."""
+    entries = [entry for row in a for entry in row]
+    columns = len(a[0])
+    names = sorted(free_symbols(entries))
+    generator = random.Random(0)  # noqa: S311 - any points will do, the same in every run
+    seen = False
+    for _ in range(_POINTS):
+        point = {name: constant(Fraction(generator.randint(-9_999, 9_999), 1_000)) for name in names}
+        try:
+            values = [entry.fraction for entry in substitute(entries, point) if entry.is_constant]
+        except ZeroDivisionError:
+            continue
+        if len(values) == len(entries):
+            if not null_space([values[i : i + columns] for i in range(0, len(values), columns)]):
+                return False
+            seen = True
+    if seen and not names:
+        return True
+    few = columns <= _LARGEST_SYMBOLIC
+    return few and is_zero(determinant(multiply(transpose(a), a))) is True
+
+
+def asymmetric_entry(a: Rows, budget: int) -> tuple[int, int, bool] | None:
+    """The first (i, j), i < j, whose entries are not proven equal; and whether they provably differ."""
+    for i, j in combinations(range(len(a)), 2):
+        if a[i][j] is not a[j][i]:
+            zero = is_zero(a[i][j] - a[j][i], budget)
+            if zero is not True:
+                return i, j, zero is False
+    return None

@@ -21,6 +21,9 @@ from tubecert.report.page import Page
 from tubecert.report.progress import timed
 from tubecert.spec import Spec, Synthesis, metric_file
 from tubecert.spec.metric import solver_name
+from tubecert.spec.metric_file import FORMAT
+from tubecert.spec.source import Source
+from tubecert.synthesis import coefficients
 from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -149,13 +152,11 @@ def with_metric(spec: Spec, metric: MetricLike, rate: Fraction | None = None) ->
 
     `rate` stands in for that of coefficients. Raises `TubecertError`.
     """
-    if isinstance(metric, _Metric):
-        return metric_file.with_metric_text(spec, metric.text(), f"<{IN_CODE}>"), IN_CODE
-    if isinstance(metric, Mapping):
-        whole = {"format": metric_file.FORMAT, **metric}
-        return metric_file.with_metric_text(spec, document_text(whole), f"<{IN_CODE}>"), IN_CODE
-    path = os.fspath(metric)
-    return metric_file.with_metric(spec, path, rate), os.path.basename(path)
+    if not isinstance(metric, _Metric | Mapping):
+        path = os.fspath(metric)
+        return coefficients.with_metric(spec, path, rate), os.path.basename(path)
+    whole = metric.text() if isinstance(metric, _Metric) else document_text({"format": FORMAT, **metric})
+    return metric_file.with_metric(spec, Source.of(f"<{IN_CODE}>", whole)), IN_CODE
 
 
 @asking.question({

@@ -25,7 +25,7 @@ from tubecert.lint.room import least_radius, room_findings
 from tubecert.lint.table import paid, table_findings
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.spec import Obstacle, Spec
-from tubecert.spec.trim import Plant, equilibrium
+from tubecert.spec.system import Plant, equilibrium
 
 _SAMPLES = 257
 _ROUNDING = 1e-9

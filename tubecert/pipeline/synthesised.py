@@ -28,7 +28,8 @@ from tubecert.metric.verify import MetricProof
 from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
 from tubecert.spec.canonical import synthesis_data
-from tubecert.spec.metric_file import FORMAT, with_metric_text
+from tubecert.spec.metric_file import FORMAT, with_metric
+from tubecert.spec.source import Source
 from tubecert.synthesis.rounding import VerifiedMetric
 from tubecert.verdict import Verdict
 
@@ -129,7 +130,7 @@ class TooLongError(Exception):
 def read_back(spec: Spec, metric: VerifiedMetric) -> Spec:
     """The specification with the metric that its file will hold; raises `SpecError` if it is too long for one."""
     content = {"format": FORMAT, **_data(metric)}
-    return with_metric_text(spec, json.dumps(content), "<synthesised>")
+    return with_metric(spec, Source.of("<synthesised>", json.dumps(content)))
 
 
 def _data(metric: VerifiedMetric) -> Json:

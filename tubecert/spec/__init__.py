@@ -11,8 +11,6 @@ In: the path of a YAML file. Out: `Spec` (exact numbers, expressions with obliga
 | `system`, `plan`, `start`, `metric`, `tube`, `machine`, `scene` | the table: sections of the file by chapters |
 | `names` | the names that expressions may use, and outputs |
 | `table` | a plan file (CSV): text -> exact knots |
-| `algebra` | exact checks: definiteness, symmetry, rank |
-| `trim` | the equilibrium near a point |
 | `override` | keys that the command line sets, put into the tree |
 | `load` | the file as a section, and what holds between sections |
 | `canonical` | the effective specification as plain data |

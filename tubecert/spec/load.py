@@ -34,12 +34,12 @@ from tubecert.spec.system import (
     SAFE_SET,
     SYSTEM,
     UNCERTAINTY,
+    Plant,
     read_disturbance,
     read_dynamics,
     read_uncertainty,
     read_units,
 )
-from tubecert.spec.trim import Plant
 from tubecert.spec.tube import (
     ADAPTATION,
     CONDITIONS,
@@ -55,7 +55,7 @@ from tubecert.spec.tube import (
     tube_data,
 )
 from tubecert.spec.types import Spec
-from tubecert.spec.values import Places, Term
+from tubecert.spec.values import Term
 
 VERSION: Final = 1
 
@@ -223,7 +223,7 @@ def _read(root: Field, settings: Sequence[Setting], reads: Reads) -> Spec | None
         outputs=names.outputs,
         settings=tuple((each.path, each.text) for each in settings),
         lacks=lacks,
-        locations=Places(root.reader.places),
+        locations=root.reader.places,
         **found,
     )
 

@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing import Final, Literal
 
 from tubecert.expression import suggestion, to_text
+from tubecert.expression.matrix import asymmetric_entry
 from tubecert.spec import codes, keys
-from tubecert.spec.algebra import asymmetric_entry
 from tubecert.spec.keys import AUTO, NAME, Kind, Section, entry, key, number, or_auto, section, several, word
 from tubecert.spec.names import Names
 from tubecert.spec.reader import Field

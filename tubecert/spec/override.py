@@ -13,7 +13,7 @@ from typing import Final
 
 from tubecert.errors import SpecError
 from tubecert.expression import suggestion
-from tubecert.findings import Finding, Location, NamedPlace
+from tubecert.findings import Finding, NamedPlace
 from tubecert.spec import codes
 from tubecert.spec.document import Node, compose
 from tubecert.spec.source import Mark, Source, check_limits
@@ -40,7 +40,7 @@ class Setting:
     def of(cls, words: str, option: str = OPTION) -> Setting:
         """What `KEY=VALUE` says; raises `SpecError`."""
         path, equals, text = (part.strip() for part in words.partition("="))
-        source = _OptionText.of(option, words)
+        source = Source.of(option, words, NamedPlace)
         check_limits(source)
         if not words.isprintable():
             _refuse(source, codes.WRONG_TYPE, "the text holds a character that does not print", _FORM)
@@ -65,24 +65,12 @@ class Setting:
         return f"{self.path}={self.text}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _OptionText(Source):
-    """The text of an option; its name stands for file, line and column."""
-
-    def location(self, mark: Mark, width: int = 1) -> Location:
-        """The place as a finding names it."""
-        found = Source.location(self, mark, width)
-        return NamedPlace(
-            file=self.file, line=1, column=found.column, source=found.source, width=max(1, width)
-        )
-
-
 class _Put:
     """One setting on its way into the tree: `parts` are the keys and numbers of its path."""
 
     def __init__(self, setting: Setting, findings: list[Finding]) -> None:
         self.setting, self.findings = setting, findings
-        self.source = _OptionText.of(setting.place, str(setting))
+        self.source = Source.of(setting.place, str(setting), NamedPlace)
         self.parts = list(_PART.finditer(setting.path))
 
     def within(self, root: Node, k: int = 0, names: Mapping[str, str] | None = None) -> Node:
@@ -167,7 +155,7 @@ def put(node: Node | None, settings: Sequence[Setting]) -> tuple[Node | None, li
         if other is not None:
             twice = f"{setting.path} is set twice"
             message = twice if other.path == setting.path else f"{other.path} is set, too"
-            source = _OptionText.of(setting.place, str(setting))
+            source = Source.of(setting.place, str(setting), NamedPlace)
             place = source.location(Mark(line=0, column=0), len(setting.path))
             findings.append(
                 Finding(code=codes.DUPLICATE_KEY, message=message, location=place, help="keep one")

@@ -8,14 +8,13 @@ from fractions import Fraction
 from typing import Any, ClassVar, Final, Literal, get_args
 
 from tubecert.expression import ExpressionError, constant, free_symbols, parse_number, to_text
+from tubecert.expression.matrix import is_positive_definite, is_positive_semidefinite
 from tubecert.spec import codes, keys
-from tubecert.spec.algebra import is_positive_definite, is_positive_semidefinite
 from tubecert.spec.keys import SIZE, Kind, each, entry, expressions, form, key, number, numbers, section, word
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field
-from tubecert.spec.system import Uncertainty, no_uncertainty
+from tubecert.spec.system import Plant, Uncertainty, equilibrium, no_uncertainty
 from tubecert.spec.table import COLUMNS, read_table
-from tubecert.spec.trim import Plant, equilibrium
 from tubecert.spec.values import Ends, Interpolation, Matrix, Table, Term, Vector
 
 PlanKind = Literal["equilibrium", "expressions", "csv", "ilqr", "any"]

@@ -36,26 +36,29 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A file's name and text; `lines` are for display (nothing in them steers a terminal)."""
+    """A file's name and text; `lines` are for display (nothing in them steers a terminal), `place` names them."""
 
     file: str
     text: str
     lines: tuple[str, ...] = field(repr=False)
     starts: tuple[int, ...] = field(repr=False)
+    place: type[Location] = Location
 
     @classmethod
-    def of(cls, file: str, text: str) -> Source:
+    def of(cls, file: str, text: str, place: type[Location] = Location) -> Source:
         """The source with its lines found."""
         starts = (0, *(match.end() for match in _BREAK.finditer(text)))
         lines = tuple(blanked(line) for line in _BREAK.split(text))
-        return cls(file=file, text=text, lines=lines, starts=starts)
+        return cls(file=file, text=text, lines=lines, starts=starts, place=place)
 
     def location(self, mark: Mark, width: int = 1) -> Location:
         """The place as a finding names it."""
         number = min(mark.line, len(self.lines) - 1)  # the end of a text may be called its next line
         line = self.lines[number]
         column = min(mark.column, len(line)) if number == mark.line else len(line)
-        return Location(file=self.file, line=number + 1, column=column + 1, source=line, width=max(1, width))
+        return self.place(
+            file=self.file, line=number + 1, column=column + 1, source=line, width=max(1, width)
+        )
 
     def index(self, mark: Mark) -> int:
         """Position of the mark in the text."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import log10
 from typing import Any, Final, NamedTuple
 
 from tubecert.expression import (
@@ -20,16 +21,18 @@ from tubecert.expression import (
     symbol,
     to_text,
 )
+from tubecert.expression.balls import towards_root
+from tubecert.expression.matrix import dependent_columns
 from tubecert.spec import codes, keys
-from tubecert.spec.algebra import dependent_columns
 from tubecert.spec.instead import glued
 from tubecert.spec.keys import NUMBER, SIZE, each, entry, expressions, form, key, numbers_text, section
 from tubecert.spec.lookup import SLOPES, TABLE
 from tubecert.spec.names import MAX_STATES, Names, key_field
 from tubecert.spec.reader import Field, whole
-from tubecert.spec.values import Output, Term, TermMatrix, Vector
+from tubecert.spec.values import Ends, Output, Term, TermMatrix, Vector, out_of_range
 
 MAX_COLUMNS: Final = 32
+DIGITS: Final = 20  # of an equilibrium
 _NAMES: Final = {"type": "array", "items": keys.NAME, "minItems": 1, "maxItems": MAX_STATES}
 _UNITS: Final = {
     "type": "object",
@@ -367,3 +370,38 @@ def read_disturbance(field: Field, names: Names) -> Disturbance | None:
     E = values.pop("E", None if "E" in entries else identity)
     bound = _bound(entries["bound"], names, len(E[0]) if E else None) if "bound" in entries else None
     return Disturbance(**values, E=E, bound=bound) if sound and bound is not None else None
+
+
+class Plant(NamedTuple):
+    """What an equilibrium is one of: x' = f + B u in the names of states and inputs, and the safe set."""
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    f: tuple[Term, ...]
+    B: TermMatrix
+    box: tuple[Ends, ...]
+
+
+def equilibrium(plant: Plant, x: Vector, u: Vector) -> tuple[Vector, Vector] | None:
+    """x* (n) in the safe set and u* (m) near a point with f + B u = 0, to `DIGITS` digits; None if none is met.
+
+    First the inputs alone move; where none holds the point, states move with them, by equal shares of the safe set. It
+    is no more than a proposal: by how much it misses the dynamics is bounded as for any other plan.
+    """
+    n, names = len(plant.states), (*plant.states, *plant.inputs)
+    drift = [
+        sum((b.expression * symbol(name) for b, name in zip(row, plant.inputs, strict=True)), start=ZERO)
+        + f.expression
+        for f, row in zip(plant.f, plant.B, strict=True)
+    ]
+    size = [(high - low) / 2 for low, high in plant.box] + [max(abs(own), Fraction(1)) for own in u]
+    z = [*x, *u]
+    for first, steps in ((n, 3), (0, 20)):  # f + B u is affine in u
+        z, met = towards_root(drift, names, z, size, first=first, steps=steps)
+        if met:
+            found = [round(own, DIGITS - round(log10(unit))) for own, unit in zip(z, size, strict=True)]
+            inside = all(low <= own <= high for own, (low, high) in zip(found, plant.box, strict=False))
+            return (
+                (tuple(found[:n]), tuple(found[n:])) if inside and not any(map(out_of_range, found)) else None
+            )
+    return None

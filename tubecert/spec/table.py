@@ -18,10 +18,10 @@ from fractions import Fraction
 from typing import Final
 
 from tubecert.expression import suggestion
+from tubecert.expression.lookup import DIGITS, rounded
 from tubecert.findings import capped
 from tubecert.spec import codes, keys
 from tubecert.spec.keys import key, section
-from tubecert.spec.lookup import DIGITS, rounded
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.reader import Field, whole
 from tubecert.spec.sheet import ENOUGH, Cell, Sheet, number, opened, rows

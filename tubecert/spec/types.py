@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -13,14 +14,7 @@ from tubecert.spec.plan import Trajectory
 from tubecert.spec.scene import Obstacle, Simulation
 from tubecert.spec.system import Disturbance, Uncertainty
 from tubecert.spec.tube import Adaptation, Expectation, Tube
-from tubecert.spec.values import (
-    Ends,
-    Output,
-    Places,
-    Term,
-    TermMatrix,
-    Vector,
-)
+from tubecert.spec.values import Ends, Output, Term, TermMatrix, Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +37,7 @@ class Spec:
     ranges: tuple[tuple[str, Ends], ...] = ()
     definitions: tuple[str, ...] = field(
         default=(), compare=False
-    )  # their names: expressions have them written out
+    )  # names: expressions have them written out
     tables: tuple[Lookup, ...] = ()
     f: tuple[Term, ...]
     drift: tuple[Term, ...] = ()
@@ -70,7 +64,7 @@ class Spec:
     disturbance: Disturbance | None = None
     settings: tuple[tuple[str, str], ...] = ()  # keys set by the command line, with their texts
     lacks: tuple[str, ...] = ()  # sections that a file need not have that asks about a metric alone
-    locations: Places = field(repr=False, compare=False, hash=False)
+    locations: Mapping[str, Location] = field(repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:
         n, m = len(self.states), len(self.inputs)

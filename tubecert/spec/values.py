@@ -149,21 +149,3 @@ class Output:
 
     name: str
     row: Vector
-
-
-class Places(Mapping[str, Location]):
-    """Where the value of each key of the file stands; read-only, and it can be pickled."""
-
-    __slots__ = ("_found",)
-
-    def __init__(self, found: Mapping[str, Location]) -> None:
-        self._found = dict(found)
-
-    def __getitem__(self, path: str) -> Location:
-        return self._found[path]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._found)
-
-    def __len__(self) -> int:
-        return len(self._found)

@@ -21,8 +21,8 @@ from tubecert.records import FormError, from_json, to_json
 from tubecert.sampled_loop import record as sampled
 from tubecert.spec import Setting, Spec
 from tubecert.spec.load import load_source
-from tubecert.spec.metric_file import with_metric
 from tubecert.spec.source import Source
+from tubecert.synthesis.coefficients import with_metric
 
 ERROR_FORMAT: Final = "tubecert-sweep-error/1"
 _KEPT: Final = 256  # proofs that a worker remembers

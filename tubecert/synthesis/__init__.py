@@ -8,6 +8,7 @@
 | `cegis`, `attack` | route: conditions at points, and where they fail |
 | `sos`, `polynomial`, `chart` | route: sums of squares |
 | `rounding` | floats -> few digits, proven |
+| `coefficients` | metrics as other tools keep them |
 | `ladder` | degrees, routes and back-offs until a proof succeeds; searches over rates and boxes |
 | `diagnose` | uncontrollable modes: why there is no metric |
 """

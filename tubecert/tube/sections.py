@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tubecert.coordinates import Coordinates, Rows
 from tubecert.enclosure.interval import Array, Interval, fraction_bounds, sqrt
 from tubecert.enclosure.outward import down, up
-from tubecert.spec.algebra import is_positive_semidefinite
+from tubecert.expression.matrix import is_positive_semidefinite
 
 Cut = tuple[Array, Array, NDArray[np.bool_]]
 _SHARES = (
