@@ -34,7 +34,7 @@ SIDES = {
     "theorem": ("tubecert.sampled_loop", ("theorem", "responses", "remainders"), ("tests/sampled_loop",)),
     "recheck": (
         "tubecert.recheck.sampled_loop",
-        ("theorem", "loop", "remainders", "windows", "claims"),
+        ("theorem", "remainders", "claims"),
         ("tests/recheck/sampled_loop",),
     ),
 }

@@ -75,7 +75,8 @@ def _check_foreign(text: str, word: str) -> None:
     """Words that are no numbers, and numbers as they are written elsewhere."""
     bare = word.lower().lstrip("+-.")
     if bare in _NOT_FINITE:
-        help = "write a finite number; for a claim for all time leave trajectory.horizon out"
+        help = "write a finite number"
+        help += "" if "nan" in bare else "; for a claim for all time leave trajectory.horizon out"
         raise _refused(text, f"{word} is not a finite number", help)
     if bare in _NOT_NUMBERS or not word:
         what = f"{word} is not a number" if word else "a number is missing"

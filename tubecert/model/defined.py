@@ -52,7 +52,7 @@ def _undefined(term: Term, ranges: dict[str, Range], where: str, effort: Effort)
         if decision.verdict is Verdict.CERTIFIED:
             continue
         code, message = "TC202", f"'{duty.text}' could not be proven to be defined and smooth on {where}"
-        remedy = "keep the safe set further away from the singularity"
+        remedy = f"keep {where} further away from the singularity"
         if decision.verdict is Verdict.REFUTED:
             code = "TC201"
             message = (

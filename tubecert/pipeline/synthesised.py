@@ -27,7 +27,7 @@ from tubecert.expression import to_text
 from tubecert.metric.verify import MetricProof
 from tubecert.records import Json, exact_json
 from tubecert.spec import Spec, Synthesis
-from tubecert.spec.canonical import synthesis_data
+from tubecert.spec.metric import SYNTHESIS
 from tubecert.spec.metric_file import FORMAT, with_metric
 from tubecert.spec.source import Source
 from tubecert.synthesis.rounding import VerifiedMetric
@@ -109,7 +109,7 @@ class Synthesised(SearchData):
 
     def data(self) -> SynthesisData:
         """`result.synthesis` of a certificate, with its notes."""
-        return SynthesisData(asked=Asked(data=synthesis_data(self.wanted)), search=self.search())
+        return SynthesisData(asked=Asked(data=SYNTHESIS.written(self.wanted)), search=self.search())
 
     def search(self) -> SearchData:
         """What was tried; no times."""

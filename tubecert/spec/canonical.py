@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from tubecert.spec.load import FILE, VERSION
-from tubecert.spec.metric import SYNTHESIS, Synthesis
+from tubecert.spec.metric import SYNTHESIS
 from tubecert.spec.system import SYSTEM
 from tubecert.spec.types import Spec
 
@@ -22,7 +22,7 @@ def canonical(spec: Spec) -> dict[str, Any]:
     """JSON-ready data of the effective specification."""
     data = {"tubecert": VERSION, **FILE.written(spec, spec), "system": SYSTEM.written(spec, spec)}
     if spec.synthesis is not None:
-        data["metric"] = {"synthesise": synthesis_data(spec.synthesis)}
+        data["metric"] = {"synthesise": SYNTHESIS.written(spec.synthesis)}
     without = {"controller"} if spec.hardware is None else {"adaptation", "conditions"}
     if spec.lacks:  # then it is about a metric alone
         without |= {*_OF_LOOPS}
@@ -33,8 +33,3 @@ def as_file(data: Mapping[str, Any]) -> dict[str, Any]:
     """Canonical data as a file: that the tube is a ball goes without saying in the one, in the other it may not."""
     ball = "tube" in data and "hardware" not in data and "coordinates" not in data["tube"]
     return {**data, "tube": {**data["tube"], "coordinates": "identity"}} if ball else dict(data)
-
-
-def synthesis_data(wanted: Synthesis) -> dict[str, Any]:
-    """What metric is asked for."""
-    return SYNTHESIS.written(wanted)

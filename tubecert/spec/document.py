@@ -8,7 +8,7 @@ before it can hurt.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Any, Final, Literal
@@ -165,7 +165,8 @@ def _syntax(source: Source, error: yaml.YAMLError, language: str) -> Finding:
         message=f"this is not {language}: {words}"
         + (f" ({' '.join(str(context).split())[:100]})" if context else ""),
         location=location,
-        help=hidden or ("indent with spaces, not tabs" if tab else _remedy(words, location.source)),
+        help=hidden
+        or ("indent with spaces, not tabs" if tab else _remedy(words, location.source, source.lines)),
     )
 
 
@@ -185,7 +186,7 @@ def _hidden(text: str) -> str:
     return ""
 
 
-def _remedy(problem: str, line: str) -> str:
+def _remedy(problem: str, line: str, lines: Sequence[str]) -> str:
     if slip := _ASSIGNED.fullmatch(line) or _GLUED.fullmatch(line):
         return f"write {slip[1]}: {slip[2].strip()[:40]}, with a colon and a blank"
     if "quoted" in problem or "end of stream" in problem:
@@ -197,6 +198,9 @@ def _remedy(problem: str, line: str) -> str:
     if "cannot start any token" in problem:
         return "quote text that begins with a special character"
     if "expected ',' or" in problem or "flow" in problem:
+        odd = next((k for k, own in enumerate(lines, start=1) if own.partition(" #")[0].count('"') % 2), None)
+        if odd is not None:
+            return f"line {odd} opens a quote that it does not close"
         return "close every [ and {, and quote expressions that contain commas"
     return "check indentation, brackets and quotes near this place"
 

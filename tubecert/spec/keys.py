@@ -20,7 +20,7 @@ from tubecert.spec.values import Matrix, Term, TermMatrix, Vector
 if TYPE_CHECKING:
     from tubecert.spec.names import Names, Use  # which reads tables by keys
 
-Whose: TypeAlias = Literal["states", "inputs", "lengths"]
+Whose: TypeAlias = Literal["states", "inputs", "lengths", "quantities"]
 Schema: TypeAlias = Mapping[str, Any]
 
 AUTO: Final = "auto"
@@ -263,7 +263,7 @@ def named(whose: Whose, kind: Kind, shown: str = "") -> Kind:
 
     def read(field: Field, names: Names) -> tuple[tuple[str, Any], ...] | None:
         known = getattr(names, whose)
-        entries = field.mapping(optional=known)
+        entries = field.mapping(optional=known, named=True)
         if entries is None:
             return None
         if shown and not field.pairs():
@@ -274,7 +274,7 @@ def named(whose: Whose, kind: Kind, shown: str = "") -> Kind:
         found = whole(kind.read(entries[name], names) for name in there)
         return None if found is None else tuple(zip(there, found, strict=True))
 
-    form = _by_name(kind) | ({"minProperties": 1} if shown else {})
+    form = by_name(kind.schema) | ({"minProperties": 1} if shown else {})
     return Kind(read, form, lambda values, spec: {name: kind.write(value, spec) for name, value in values})
 
 
@@ -283,17 +283,18 @@ def each(whose: Whose, kind: Kind) -> Kind:
 
     def read(field: Field, names: Names) -> tuple[Any, ...] | None:
         known = getattr(names, whose)
-        entries = field.mapping(required=known) or {}
+        entries = field.mapping(required=known, named=True) or {}
         return whole((kind.read(entries[name], names) for name in known if name in entries), len(known))
 
     def write(values: Iterable[Any], spec: Any) -> dict[str, Any]:
         return {name: kind.write(own, spec) for name, own in zip(getattr(spec, whose), values, strict=True)}
 
-    return Kind(read, _by_name(kind) | {"minProperties": 1}, write)
+    return Kind(read, by_name(kind.schema) | {"minProperties": 1}, write)
 
 
-def _by_name(kind: Kind) -> dict[str, Any]:
-    return {"type": "object", "additionalProperties": kind.schema}
+def by_name(schema: Schema) -> dict[str, Any]:
+    """The schema of values by names of the file's own."""
+    return {"type": "object", "propertyNames": NAME, "additionalProperties": schema}
 
 
 def inside(

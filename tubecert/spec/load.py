@@ -34,11 +34,11 @@ from tubecert.spec.system import (
     SAFE_SET,
     SYSTEM,
     UNCERTAINTY,
+    UNITS,
     Plant,
     read_disturbance,
     read_dynamics,
     read_uncertainty,
-    read_units,
 )
 from tubecert.spec.tube import (
     ADAPTATION,
@@ -270,7 +270,7 @@ def _read_named(
     found |= {
         "f": dynamics and dynamics.f,
         "B": dynamics and dynamics.B,
-        "units": read_units(system.get("units"), names),
+        "units": UNITS.read(system["units"], names) if "units" in system else (),
         "uncertainty": uncertainty,
         "trajectory": plan,
         "x0": x0,
@@ -317,15 +317,11 @@ def _beside_moving(
         return
     lasting = "without a period that can be seen, so a trajectory with a horizon is needed"
     period = "or t in sin, cos and tan only, with frequencies that are rational multiples of each other"
-    endless = plan.horizon is None and not _returns(waves)
+    found = frequencies([part for term in waves for part in term.parts], TIME)
+    returns = found is not None and (found.period is None or found.period[0] < _LONG)
+    endless = plan.horizon is None and not returns  # or that is not to be seen
     yield endless, lasting, f"add trajectory.horizon, in seconds; {period}"
     yield isinstance(metric, Synthesis), "and metrics are not found for that: give one", NO_SEARCH
-
-
-def _returns(terms: Sequence[Term]) -> bool:
-    """Whether a common period of terms, and of what they owe, is to be seen."""
-    found = frequencies([part for term in terms for part in term.parts], TIME)
-    return found is not None and (found.period is None or found.period[0] < _LONG)
 
 
 def _check_version(field: Field | None) -> None:

@@ -153,7 +153,7 @@ def read_hardware(field: Field, names: Names) -> Hardware | None:
     delay = values.get("delay")
     if delay is not None and sample_time is not None and delay > MAX_LATE * sample_time:
         message = f"hardware.delay is {near(float(delay / sample_time))} samples; at most {MAX_LATE} are read"
-        help = f"write a time in seconds, or `delay: {ONE_SAMPLE}`, which follows the rate (in a sweep, too)"
+        help = f"it is in s (2 ms are 0.002); at this rate at most {number_text(MAX_LATE * sample_time)}"
         return entries["delay"].fail(codes.LIMIT, message, help)
     if sample_time is None or not HARDWARE.holds(values, entries):
         return None

@@ -153,24 +153,17 @@ def _bounds(field: Field, names: Names) -> Ends | None:
 def _dual(field: Field, names: Names) -> TermMatrix | None:
     n = len(names.states)
     dual = field.term_matrix(n, n, names.scope("metric"))
-    return dual if dual is not None and _symmetric(field, dual) else None
-
-
-def _symmetric(field: Field, matrix: TermMatrix) -> bool:
-    found = asymmetric_entry([[term.expression for term in row] for row in matrix], _SYMMETRY_BUDGET)
+    if dual is None:
+        return None
+    found = asymmetric_entry([[entry.expression for entry in row] for row in dual], _SYMMETRY_BUDGET)
     if found is None:
-        return True
+        return dual
     i, j, proven = found
-    above, below = (to_text(matrix[k][l].expression)[:60] for k, l in ((i, j), (j, i)))
+    above, below = (to_text(dual[k][l].expression)[:60] for k, l in ((i, j), (j, i)))
     where = f"({i + 1},{j + 1}) = {above} and ({j + 1},{i + 1}) = {below}"
-    relation = "differ" if proven else "could not be proven equal"
-    field.reader.report(
-        codes.SYMMETRY,
-        matrix[j][i].location,
-        f"dual_metric is not symmetric: {where} {relation}",
-        "write the same expression in both places",
-    )
-    return False
+    message = f"dual_metric is not symmetric: {where} {'differ' if proven else 'could not be proven equal'}"
+    help = "write the same expression in both places"
+    return field.reader.report(codes.SYMMETRY, dual[j][i].location, message, help)
 
 
 _ROWS: Final = {"type": "array", "items": {**keys.TEXTS, "description": "A row."}, "minItems": 1}

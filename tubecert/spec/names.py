@@ -90,6 +90,11 @@ class Names:
         return *self.states, *(output.name for output in self.outputs)
 
     @property
+    def quantities(self) -> tuple[str, ...]:
+        """What may have a unit."""
+        return *self.lengths, *self.inputs
+
+    @property
     def values(self) -> dict[str, Expression]:
         """The parameters by name."""
         return {name: constant(value) for name, value in self.parameters} | dict(self.irrational)

@@ -134,9 +134,13 @@ class _Put:
         return node or replace(plain, text="", end=start)
 
     def _unchanged(self, node: Node, part: re.Match[str], message: str, help: str = "") -> Node:
-        place = self.source.location(Mark(line=0, column=part.start()), part.end() - part.start())
-        self.findings.append(Finding(code=codes.UNKNOWN_KEY, message=message, location=place, help=help))
+        self.report(codes.UNKNOWN_KEY, part.span(), message, help)
         return node
+
+    def report(self, code: str, span: tuple[int, int], message: str, help: str) -> None:
+        """Adds a finding at a part of the path."""
+        place = self.source.location(Mark(line=0, column=span[0]), span[1] - span[0])
+        self.findings.append(Finding(code=code, message=message, location=place, help=help))
 
 
 def _named(root: Node) -> dict[str, str]:
@@ -152,16 +156,12 @@ def put(node: Node | None, settings: Sequence[Setting]) -> tuple[Node | None, li
     findings: list[Finding] = []
     for index, setting in enumerate(settings):
         other = next((each for each in settings[:index] if setting.meets(each.path)), None)
+        own = _Put(setting, findings)
         if other is not None:
-            twice = f"{setting.path} is set twice"
-            message = twice if other.path == setting.path else f"{other.path} is set, too"
-            source = Source.of(setting.place, str(setting), NamedPlace)
-            place = source.location(Mark(line=0, column=0), len(setting.path))
-            findings.append(
-                Finding(code=codes.DUPLICATE_KEY, message=message, location=place, help="keep one")
-            )
+            said = f"{other.path} is set, too" if other.path != setting.path else f"{other.path} is set twice"
+            own.report(codes.DUPLICATE_KEY, (0, len(setting.path)), said, "keep one")
         elif node is not None:
-            node = _Put(setting, findings).within(node)
+            node = own.within(node)
     return node, findings
 
 

@@ -20,8 +20,10 @@ from tubecert.expression import (
     Side,
     elsewhere,
     longest_text,
+    near,
     parse_constant,
     parse_number,
+    suggestion,
     topological,
 )
 from tubecert.findings import MOST, Finding, Location
@@ -97,9 +99,14 @@ class Field:
     # collections
 
     def mapping(
-        self, *, required: Sequence[str] = (), optional: Sequence[str] = (), reserved: Sequence[str] = ()
+        self,
+        *,
+        required: Sequence[str] = (),
+        optional: Sequence[str] = (),
+        reserved: Sequence[str] = (),
+        named: bool = False,
     ) -> dict[str, Field] | None:
-        """The values of the known keys; unknown, reserved and missing keys are findings."""
+        """The values of the known keys, which the file has `named`; unknown, reserved and missing ones are findings."""
         keys = [*(required or optional)]
         pairs = self.pairs(
             f"with the keys {', '.join(keys[:8])}", ", ".join(f"{key}: ..." for key in keys[:2])
@@ -113,7 +120,7 @@ class Field:
             if key.text in reserved:
                 self._at(codes.NOT_YET, key, f"{self._name(key.text)} is not yet supported", "remove it")
             elif key.text not in fields:
-                meant.update(self._unknown(key, known))
+                meant.update(self._unknown(key, known, named=named))
         missing = [key for key in required if key not in fields and key not in meant]
         if missing:
             message = f"{self.path or self.reader.document} lacks {', '.join(missing)}"
@@ -343,7 +350,7 @@ class Field:
             codes.WRONG_SHAPE, f"{self.path} has {entries}; needed: {_counted(wanted, what)}", help
         )
 
-    def _unknown(self, key: Node, known: Sequence[str]) -> list[str]:
+    def _unknown(self, key: Node, known: Sequence[str], *, named: bool) -> list[str]:
         """Reports an unknown key; returns the known ones that it may stand for."""
         if len(self.reader.findings) > MOST:
             self._at(codes.UNKNOWN_KEY, key, "unknown key")
@@ -355,7 +362,9 @@ class Field:
         if apart := glued(key.text, known):
             self._at(codes.UNKNOWN_KEY, key, message, apart)
             return [key.text.partition(":")[0]]
-        advice, meant = of_key(key.text, known)
+        advice, meant = suggestion(key.text, known, what="known keys"), near(key.text, known)
+        if not named:
+            advice, meant = of_key(key.text, known)
         self._at(codes.UNKNOWN_KEY, key, message, advice)
         return meant
 

@@ -9,14 +9,14 @@ from typing import Any, Final
 
 from tubecert.expression import ZERO, number_text, substitute, to_text
 from tubecert.spec import codes
-from tubecert.spec.keys import LIST, NAME, PAIR, form, key, number, numbers_text, section
+from tubecert.spec.keys import LIST, PAIR, by_name, form, key, number, numbers_text, section
 from tubecert.spec.names import TIME, Names
 from tubecert.spec.plan import Trajectory, read_ends
 from tubecert.spec.reader import Field, whole
 from tubecert.spec.values import Ends, Vector
 
 _AT: Final = {"anyOf": [LIST, {"$ref": "#/$defs/start_by_state"}], "examples": [[0.01, 0], {"phi": "30 deg"}]}
-_BOX: Final = {"type": "object", "propertyNames": NAME, "additionalProperties": PAIR}
+_BOX: Final = by_name(PAIR)
 MAX_WIDE: Final = 10  # sides of a box of starts: all its corners are examined
 
 

@@ -17,33 +17,34 @@ from tubecert.expression import (
     number_text,
     root_above,
     substitute,
-    suggestion,
     symbol,
     to_text,
 )
 from tubecert.expression.balls import towards_root
 from tubecert.expression.matrix import dependent_columns
 from tubecert.spec import codes, keys
-from tubecert.spec.instead import glued
-from tubecert.spec.keys import NUMBER, SIZE, each, entry, expressions, form, key, numbers_text, section
+from tubecert.spec.keys import NUMBER, SIZE, each, entry, expressions, form, key, named, numbers_text, section
 from tubecert.spec.lookup import SLOPES, TABLE
-from tubecert.spec.names import MAX_STATES, Names, key_field
+from tubecert.spec.names import MAX_STATES, Names
 from tubecert.spec.reader import Field, whole
 from tubecert.spec.values import Ends, Output, Term, TermMatrix, Vector, out_of_range
 
 MAX_COLUMNS: Final = 32
 DIGITS: Final = 20  # of an equilibrium
 _NAMES: Final = {"type": "array", "items": keys.NAME, "minItems": 1, "maxItems": MAX_STATES}
-_UNITS: Final = {
-    "type": "object",
-    "additionalProperties": {"type": ["string", "number"], "minLength": 1, "maxLength": MAX_NAME_LENGTH},
-}
 _ROWS: Final = {"type": "array", "items": keys.TEXTS, "minItems": 1}
 _B: Final = {**_ROWS, "items": {**keys.TEXTS, "description": "A row: one entry per input."}}
 
 
-def _by_name(value: keys.Schema) -> dict[str, Any]:
-    return {"type": "object", "propertyNames": keys.NAME, "additionalProperties": value}
+def _unit(field: Field, _names: Names) -> str | None:
+    unit = field.text("a unit")
+    if unit is None or (unit.isprintable() and 0 < len(unit) <= MAX_NAME_LENGTH):
+        return unit
+    return field.fail(codes.RANGE, f"a unit has 1 to {MAX_NAME_LENGTH} printable characters")
+
+
+_UNIT: Final = {"type": ["string", "number"], "minLength": 1, "maxLength": MAX_NAME_LENGTH}
+UNITS: Final = named("quantities", keys.Kind(_unit, _UNIT))
 
 
 def _parameters(known: Iterable[tuple[str, Fraction]], spec: Any) -> dict[str, Any]:
@@ -76,26 +77,28 @@ class System:
     inputs = entry(form(_NAMES), needed=True, example=["u"])
     """Names of the inputs; not more than states."""
     parameters = entry(
-        form(_by_name({"anyOf": [NUMBER, keys.PAIR]}), _parameters),
+        form(keys.by_name({"anyOf": [NUMBER, keys.PAIR]}), _parameters),
         always=True,
         example={"g": 9.81, "l": "1/2", "m": [0.47, 0.5]},
     )
     """Constants by name, exact; each may use those before it. [lower, upper] is a constant of which only that is known:
     it may be used in f, and with hardware in B, which the controller knows at the middle."""
     tables = entry(
-        form(_by_name({"section": TABLE}), _tables),
+        form(keys.by_name({"section": TABLE}), _tables),
         example={"drag": {"points": [[0, 0], [10, 0.4], [20, 1.9]]}},
     )
     """Functions by name, each a smooth curve (C1) through the points of a table: drag: {file: drag.csv} makes drag(v) a
     function in f, B, h and plans."""
-    definitions = entry(form(_by_name(keys.EXPRESSION)), into="", example={"s": "sin(p)", "d": "1 + m*s**2"})
+    definitions = entry(
+        form(keys.by_name(keys.EXPRESSION)), into="", example={"s": "sin(p)", "d": "1 + m*s**2"}
+    )
     """Names for expressions of states, t and parameters; each may use those before it, and stands for its expression
     wherever it is used."""
-    outputs = entry(form(_by_name(keys.EXPRESSION), _outputs), example={"tip": "p + 0.5*q"})
+    outputs = entry(form(keys.by_name(keys.EXPRESSION), _outputs), example={"tip": "p + 0.5*q"})
     """Linear combinations of the states, by name: sums of states times rational numbers. Each has a half-width
     |c'(x - x*)| in the certificate, beside those of the states, and may be named in tube.half_widths,
     synthesise.outputs and design --minimise."""
-    units = entry(form(_UNITS, lambda units, _: dict(units)), always=True, example={"p": "rad", "u": "N"})
+    units = entry(UNITS, always=True, example={"p": "rad", "u": "N"})
     """Units of states, inputs and outputs; for reports only."""
     f = entry(
         form(keys.TEXTS, lambda f, spec: keys.texts(spec.drift or f)),
@@ -110,25 +113,6 @@ class System:
 
 SYSTEM: Final = section(System)
 SAFE_SET: Final = each("states", keys.ends(inward="end"))
-
-
-def read_units(field: Field | None, names: Names) -> tuple[tuple[str, str], ...]:
-    """Units of states, inputs and outputs, as printed."""
-    units: list[tuple[str, str]] = []
-    if field is None:
-        return ()
-    for name, node in field.pairs("of names to units") or ():
-        own = field.child(name, node)
-        unit, known = own.text("a unit"), [*names.lengths, *names.inputs]
-        if name.text not in known:
-            message = f"{name.text[:60]} is neither a state nor an input"
-            help = glued(name.text, known) or suggestion(name.text, known)
-            key_field(field, name).fail(codes.UNKNOWN_KEY, message, help)
-        elif unit is not None and (not unit.isprintable() or not 0 < len(unit) <= MAX_NAME_LENGTH):
-            own.fail(codes.RANGE, f"a unit has 1 to {MAX_NAME_LENGTH} printable characters")
-        elif unit is not None:
-            units.append((name.text, unit))
-    return tuple(units)
 
 
 class Dynamics(NamedTuple):

@@ -64,7 +64,7 @@ def _read_column(name: str, field: Field | None, names: Names) -> Column | None:
 
 COLUMNS: Final = keys.Kind(
     _read_columns,
-    {"type": "object", "additionalProperties": {"anyOf": [{"type": "string"}, {"section": _COLUMN}]}},
+    keys.by_name({"anyOf": [{"type": "string"}, {"section": _COLUMN}]}),
 )
 
 
@@ -148,12 +148,10 @@ class _PlanFile:
             moved = header[0].column + len(header[0].text) - len(bare)
             header[0] = Cell(text=bare, line=header[0].line, column=moved)
         if not any(cell.text in self.wanted for cell in header):
-            cells = (
-                "has 1 cell, which is" if len(header) == 1 else f"has {len(header)} cells, none of which is"
-            )
-            message = f"the first line {cells} t, a state or an input"
+            message = "no cell of the first line is t, a state or an input"
             commas = len(header) == 1 and re.search(r"[;\t ]", header[0].text)
-            help = f"{'separate columns by commas; ' if commas else ''}{self._all()}"
+            apart = "separate columns by commas, and write decimals with a point; " if commas else ""
+            help = f"{apart}{self._all()}"
             sheet.fail(Cell(line=header[0].line), codes.PLAN_COLUMNS, message, help)
             return False
         # of columns with names that a stranger chose nothing is shown before a row of numbers
