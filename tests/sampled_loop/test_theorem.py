@@ -23,7 +23,7 @@ from tubecert.sampled_loop.record import Recipe, Stage, Tables
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.responses import Acting, Dynamics, Responses
 from tubecert.sampled_loop.setting import Loop
-from tubecert.sampled_loop.theorem import Boxes, Inequalities, check
+from tubecert.sampled_loop.theorem import Boxes, Inequalities, _short, check
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.make import plan_of
 from tubecert.trajectory.pieces import piecewise_plan
@@ -117,6 +117,11 @@ def test_wind():
     found = bounds(loop_of(disturbance="{E: [[1]], bound: 0.3}"))
     close(found.W, 0.3 * TS)
     close(found.U, 0.3)
+
+
+def test_winds_add():
+    found = bounds(loop_of(disturbance="{E: [[1]], bound: 0.3}", uncertainty="{bounds: {h: 0.2}}"))
+    close(found.W, 0.5 * TS)
 
 
 def test_wind_of_a_length_is_less_than_that_of_its_components():
@@ -421,6 +426,12 @@ def test_how_far_from_the_chord():
     close(last, [[3 * 0.06**2 / 8, 4 * 0.06**2 / 8, 0], [0, 0, 0]])
 
 
+def test_how_far_from_the_chord_of_a_later_piece():
+    """x' = 3 x: x'' = 9 e^(3 s) x(0)."""
+    own = Responses(loop_of(system=scalar("3*x"), A=[[3]]), controller_of([[0]]), lags=1, pieces=2, panels=1)
+    close(own.pieces[:, 0, own.passing], [9 * exp(3 * end) * (TS / 2) ** 2 / 8 for end in (TS / 2, TS)])
+
+
 def test_chords_meet_the_box_and_noise():
     machine = "{sample_time: 0.1, noise: {x: 0.01, v: 0.02}}"
     loop = loop_of(**{**DOUBLE, "hardware": machine}, A=[[0, 1], [0, 0]], B=[[0], [1]])
@@ -588,6 +599,21 @@ def test_tables_are_of_single_precision(entry, verdict):
     assert judged(loop_of(), controller_of([[entry]]), (0, [1], 9)).verdict.value == verdict
 
 
+def test_an_error_stays_strictly_within_its_box_and_what_is_sent_may_fill_its_own():
+    found = bounds(loop := loop_of(hardware="{sample_time: 0.1, noise: {x: 0.01}}"))
+    assert _short(loop, found, found)
+    assert not _short(loop, found, found._replace(W=np.nextafter(found.W, 9)))
+
+
+@pytest.mark.parametrize("name", ["windows", "pieces", "panels", "lags"])
+def test_a_recipe_has_one_of_each_or_more(name):
+    loop, own = loop_of(), controller_of()
+    one = Stage(start=0, half_widths={"x": Fraction(1)}, deviations={"u": Fraction(9)}, memory=())
+    for many, verdict in ((0, "undecided"), (1, "certified")):
+        found = check(loop, own, [one], replace(asked(loop, cut=0).recipe, **{name: many}))
+        assert found.verdict.value == verdict
+
+
 def test_cuts_are_lags():
     loop = loop_of(uncertainty="{h: ['0.1*sin(t)']}")
     for cut, verdict in ((-1, "undecided"), (0, "certified"), (6, "undecided")):
@@ -632,3 +658,10 @@ def test_obstacles_keep_out_of_boxes_about_the_plan(obstacle, verdict):
     loop = loop_of(**DOUBLE, A=[[0, 1], [0, 0]], B=[[0], [1]], obstacles=f"[{{{obstacle}}}]")
     (found,) = cleared(loop, np.array([[0.1, 0.2]]), [0])
     assert found.verdict == verdict
+
+
+def test_the_obstacle_that_is_in_the_way_is_named():
+    far, near = (f"{{disc: {{center: [{x}, 0], radius: 0.5}}}}" for x in (4, 1))
+    loop = loop_of(**DOUBLE, A=[[0, 1], [0, 0]], B=[[0], [1]], obstacles=f"[{far}, {near}]")
+    lacks = judged(loop, controller_of([[-3, -4]]), (0, (0.6, 1), 3)).lacks
+    assert [lack.where for lack in lacks if lack.kind == "obstacle"] == ["2"]
