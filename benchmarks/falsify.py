@@ -16,7 +16,8 @@ from pathlib import Path
 from tubecert import pipeline
 from tubecert.letters import DISTANCE
 from tubecert.simulation.adaptive.campaign import Attack, simulate
-from tubecert.simulation.adaptive.setting import Choice, Loop, Setting, loop_of, setting_of
+from tubecert.simulation.adaptive.loops import Loop
+from tubecert.simulation.adaptive.setting import Choice, Setting, loop_of, setting_of
 from tubecert.spec import load
 
 CONFIGS = Path(__file__).parent.parent / "configs"

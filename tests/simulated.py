@@ -14,8 +14,7 @@ from tubecert import pipeline
 from tubecert.certificate.result import Result
 from tubecert.simulation.adaptive.continuous import DIVERGED
 from tubecert.simulation.adaptive.engine import integrate
-from tubecert.simulation.adaptive.lanes import Found
-from tubecert.simulation.adaptive.loops import Cases, Disturbance, LoopProblem, Runs
+from tubecert.simulation.adaptive.loops import Cases, Disturbance, Found, Loop, Problem, Runs, Seen, Sizes
 from tubecert.simulation.adaptive.reading import adopted
 from tubecert.simulation.adaptive.setting import Setting, setting_of
 from tubecert.spec import Spec, load, load_text
@@ -42,10 +41,10 @@ def setting(name: str, epsilon: str | None = None, duration: str | None = None) 
     return setting_of(spec, result, None if duration is None else Fraction(duration))
 
 
-def alone(problem: LoopProblem, x0: np.ndarray, disturbance: Disturbance, *, tolerance: float) -> Runs:
-    """Runs from x0 (N, n)."""
+def alone(case: tuple[Problem, Loop], x0: np.ndarray, disturbance: Disturbance, *, tolerance: float) -> Runs:
+    """Runs of a loop from x0 (N, n)."""
     cases = Cases(np.asarray(x0, dtype=float).T, disturbance)
-    return integrate([(problem, cases)], tolerance=tolerance)[0]
+    return integrate([(*case, cases)], tolerance=tolerance)[0]
 
 
 def runs(
@@ -75,9 +74,9 @@ def runs(
     over = {lane: (DIVERGED, t) for lane, t in (ended or {}).items()}
     why, when = zip(*(over.get(lane, (0, np.nan)) for lane in range(N)), strict=True)
     found = Found(
-        seen={name: np.moveaxis(part, 0, -1).copy() for name, part in seen.items()},
-        peak={name: value for name, (value, _) in met.items()},
-        peak_time={name: time for name, (_, time) in met.items()},
+        seen=Seen(**{name: np.moveaxis(part, 0, -1).copy() for name, part in seen.items()}),
+        peak=Sizes(**{name: value for name, (value, _) in met.items()}),
+        peak_time=Sizes(**{name: time for name, (_, time) in met.items()}),
         least=np.zeros((m, N)) + least,
         greatest=np.zeros((m, N)) + greatest,
         stopped=np.array(why),

@@ -11,7 +11,7 @@ from tubecert.certificate.result import Result
 from tubecert.claims.statements import PlanInSafeSet, StartInTube, TubeInSafeSet
 from tubecert.errors import SpecError
 from tubecert.pipeline import Options, certify
-from tubecert.simulation.adaptive.attack import cases
+from tubecert.simulation.adaptive.campaign import cases
 from tubecert.simulation.adaptive.engine import integrate
 from tubecert.simulation.adaptive.flows import Fast
 from tubecert.simulation.adaptive.judge import compare
@@ -251,7 +251,7 @@ def test_simulations_stay_within_what_is_certified(tube):
     setting = setting_of(spec, result)
     for source in ("26", "distance"):
         loop = loop_of(setting, "l1", Choice(source=source))
-        (runs,) = integrate([(loop, cases(setting, 0, range(6)))], tolerance=setting.tolerance)
+        (runs,) = integrate([(setting, loop, cases(setting, 0, range(6)))], tolerance=setting.tolerance)
         found = compare(setting, runs, loop.promise)
         assert not found.violations
         assert not found.left_the_tube
@@ -264,9 +264,9 @@ def test_the_loop_is_the_one_in_the_coordinates_of_the_tube():
     result = certify(load_text(joint(12)), COARSE)
     setting = setting_of(load_text(joint(12)), result)
     loop = loop_of(setting, "l1", Choice(source="distance"))
-    S, problem = setting.S, loop
-    assert not np.allclose(problem.P, np.eye(4))
-    own, its = (Fast(problem.adapts, problem.gains, P, 1, 1) for P in (problem.P, np.eye(4)))
+    S = setting.S
+    assert not np.allclose(setting.P, np.eye(4))
+    own, its = (Fast(loop.adapts, loop.gains, P, 1, 1) for P in (setting.P, np.eye(4)))
     B = np.array([[0.0], [0.0], [0.0], [2 / 12]])
     flow, flow_z = own.flow(B, 0.01, 0), its.flow(S @ B, 0.01, 0)
     T = np.eye(flow.powers[1].shape[0])

@@ -12,11 +12,11 @@ from simulated import FLAT, certified, setting
 
 from tubecert.certificate import dump, seal
 from tubecert.executor import Processes, Serial
-from tubecert.simulation.adaptive import attack, engine
 from tubecert.simulation.adaptive import campaign as campaigns
+from tubecert.simulation.adaptive import engine
 from tubecert.simulation.adaptive import figures as drawing
-from tubecert.simulation.adaptive.attack import cases
-from tubecert.simulation.adaptive.setting import Choice, loop_of
+from tubecert.simulation.adaptive.campaign import cases
+from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
 
 pytestmark = pytest.mark.timeout(240)  # the first run compiles
 LOCATED = re.compile(r"(^|\n)(\S+:\d+:\d+: |--[a-z-]+: )?error TC\d{3}: ")
@@ -133,7 +133,7 @@ def test_runs_do_not_depend_on_how_many_there_are_and_how_they_are_grouped(monke
     parts = campaigns.simulate(where, loops, count=5, seed=5).attacks[0].random.runs
     close = {"rtol": 0, "atol": 1e-12}  # BLAS sums in another order
     np.testing.assert_allclose(whole.x[:5], parts.x, **close)
-    np.testing.assert_allclose(whole.found.peak["distance"][:5], parts.found.peak["distance"], **close)
+    np.testing.assert_allclose(whole.found.peak.distance[:5], parts.found.peak.distance, **close)
 
 
 @pytest.mark.slow
@@ -146,7 +146,7 @@ def test_processes_find_the_same(monkeypatch, quick):
         for each in (Serial(), Processes(2))
     )
     np.testing.assert_array_equal(one.x, two.x)
-    np.testing.assert_array_equal(one.found.peak["distance"], two.found.peak["distance"])
+    np.testing.assert_array_equal(one.found.peak.distance, two.found.peak.distance)
 
 
 def interrupted_at(monkeypatch, call):
@@ -159,8 +159,7 @@ def interrupted_at(monkeypatch, call):
             raise KeyboardInterrupt
         return real(*arguments, **options)
 
-    for module in (campaigns, attack):
-        monkeypatch.setattr(module, "integrate", integrate)
+    monkeypatch.setattr(campaigns, "integrate", integrate)
 
 
 @pytest.mark.slow
@@ -168,7 +167,7 @@ def interrupted_at(monkeypatch, call):
 def test_interruption_keeps_what_is_finished(files, monkeypatch, call, runs):
     """Of five vectors with two runs each, of the four rounds of the adversary, and of its own run."""
     monkeypatch.setattr(campaigns, "LANES", 2)
-    monkeypatch.setattr(attack, "_POPULATION", 4)
+    monkeypatch.setattr(campaigns, "_POPULATION", 4)
     interrupted_at(monkeypatch, call)
     result = command("--runs", "9")
     assert result.exit_code == 130, result.output
@@ -294,15 +293,11 @@ def test_a_metric_of_its_own(files):
     assert "metric" in result.output, result.output
 
 
-def with_upper(own, share):
-    """The setting of a tube over which M varies by this share."""
-    lower = (own.reach / own.rho) ** 2
-    return replace(own, upper=lower * (1 + share))
-
-
 def test_geodesics_are_cubic_where_the_metric_hardly_varies_over_the_tube():
-    own = setting("flat")
-    degrees = [loop_of(with_upper(own, share), "ccm", Choice()).degree for share in (0.009, 0.011)]
-    assert degrees == [3, 5]
-    unknown = replace(own, upper=None)
-    assert loop_of(unknown, "ccm", Choice()).degree == 5
+    spec, result = certified("flat")
+    degrees = []
+    for share in (0.009, 0.011, np.inf):
+        lower = result.metric.lower.below
+        upper = replace(result.metric.upper, below=lower, above=lower * (1 + share))
+        degrees.append(setting_of(spec, replace(result, metric=replace(result.metric, upper=upper))).degree)
+    assert degrees == [3, 5, 5]

@@ -14,7 +14,8 @@ from tubecert.errors import TubecertError
 from tubecert.letters import DISTANCE, RATES
 from tubecert.simulation.adaptive.judge import check_class, compare
 from tubecert.simulation.adaptive.loops import joined
-from tubecert.simulation.adaptive.reading import Certified, Decay, promise
+from tubecert.simulation.adaptive.reading import Decay
+from tubecert.simulation.adaptive.setting import promise, setting_of
 from tubecert.simulation.adaptive.uncertainty import class_of
 from tubecert.simulation.told import RunAt
 from tubecert.spec import Output, load_text
@@ -67,11 +68,11 @@ def test_the_error_of_the_estimate_counts_from_the_start():
 
     def right(t, D):
         share = np.exp(-omega * t)
-        seen = share * own["h_initial"] + (1 - share) * rest + e
-        return -own.rate * D + own["metric_input_gain"] * seen + own["plan_defect"]
+        seen = share * own.sup("h_initial") + (1 - share) * rest + e
+        return -float(own.model.rate) * D + own.sup("metric_input_gain") * seen + own.sup("plan_defect")
 
     t = np.linspace(0, 1 / omega, 31)
-    start = [own["initial_distance"]]
+    start = [own.sup("initial_distance")]
     solved = solve_ivp(right, (0, t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-14).y[0]
     np.testing.assert_allclose(promise(own, DISTANCE).decay(t), solved, rtol=1e-7)
 
@@ -79,7 +80,7 @@ def test_the_error_of_the_estimate_counts_from_the_start():
 @pytest.mark.slow
 def test_the_largest_promised_distance_is_the_margin_of_the_certificate():
     _, result = certified("two_state", "0.4")
-    found = promise(Certified.of(result), DISTANCE)
+    found = promise(setting("two_state", "0.4"), DISTANCE)
     assert found.decay is not None
     margin = result.to_json()["distance"]["least_adaptation"]["margin"]
     left = 1 - found.decay(np.linspace(0, 5, 5001)).max() / found.bounds["distance"]
@@ -87,8 +88,8 @@ def test_the_largest_promised_distance_is_the_margin_of_the_certificate():
 
 
 def test_only_certified_sections_promise():
-    _, result = certified("flat")
-    assert promise(Certified.of(result), DISTANCE) is not None
+    spec, result = certified("flat")
+    assert promise(setting_of(spec, result), DISTANCE) is not None
     refuted = {"distance": replace(result.sections["distance"], verdict=Verdict.REFUTED)}
     changes = (
         {"sections": {}, "decided_by": ()},
@@ -96,7 +97,7 @@ def test_only_certified_sections_promise():
         {"sections": result.sections | refuted},
     )
     for change in changes:
-        assert promise(Certified.of(replace(result, **change)), DISTANCE) is None
+        assert promise(setting_of(spec, replace(result, **change)), DISTANCE) is None
 
 
 def test_what_keeps_every_promise_breaks_none():
@@ -253,31 +254,29 @@ def numbers():
         "B_pinv_x plan_defect plan_defect_metric drift_on_plan M_x"
     )
     constants = {name: Bound(below=0.0, above=0.3 + 0.11 * i) for i, name in enumerate(names.split())}
-    return replace(
-        Certified.of(result), result=replace(result, constants=constants), rho=0.7, reach=0.4, upper=1.9
-    )
+    return replace(setting("flat"), result=replace(result, constants=constants), rho=0.7, reach=0.4)
 
 
 @pytest.mark.parametrize("kind", [RATES, DISTANCE], ids=str)
 def test_bounds_are_those_of_the_theory(numbers, kind):
     c, recipe = numbers, numbers.result.proof.of[kind.key]
     kmax, R_H, Gamma = (
-        c["feedback_gain"] * 0.4,
+        c.sup("feedback_gain") * 0.4,
         float(recipe.projection_radius),
         float(recipe.adaptation_rate),
     )
     if kind == RATES:
-        xtilde = c["prediction_error"] / Gamma**0.5
+        xtilde = c.sup("prediction_error") / Gamma**0.5
     else:
-        s1, q = c["h_t"] + c["h_x"] * float(recipe.speed), 2 * float(recipe.predictor_gain)
-        V = (2 * (c["h"] + R_H) * s1 / q + (c["h"] + R_H) ** 2) / Gamma  # (2.11)
+        s1, q = c.sup("h_t") + c.sup("h_x") * float(recipe.speed), 2 * float(recipe.predictor_gain)
+        V = (2 * (c.sup("h") + R_H) * s1 / q + (c.sup("h") + R_H) ** 2) / Gamma  # (2.11)
         xtilde = V**0.5
     expected = {
         "distance": 0.4,
         "deviation": 0.7,
         "k": kmax,
-        "u": c["u_star"] + kmax + R_H,
-        "sigma_error": c["h"] + R_H,
+        "u": c.sup("u_star") + kmax + R_H,
+        "sigma_error": c.sup("h") + R_H,
         "xtilde": xtilde,
     }
     found = promise(numbers, kind)
@@ -291,23 +290,27 @@ def test_what_unknown_parameters_do_beside_the_inputs_counts(numbers):
     result = replace(numbers.result, constants={**numbers.result.constants, **constants})
     c, recipe = numbers, numbers.result.proof.of[DISTANCE.key]
     Gamma, q, s1 = map(
-        float, (recipe.adaptation_rate, 2 * recipe.predictor_gain, c["h_t"] + c["h_x"] * float(recipe.speed))
+        float,
+        (
+            recipe.adaptation_rate,
+            2 * recipe.predictor_gain,
+            c.sup("h_t") + c.sup("h_x") * float(recipe.speed),
+        ),
     )
-    most, drag = c["h"] + float(recipe.projection_radius), 0.5 / q
+    most, drag = c.sup("h") + float(recipe.projection_radius), 0.5 / q
     expected = (most**2 / Gamma + (drag + (drag**2 + 2 * most * s1 / (q * Gamma)) ** 0.5) ** 2) ** 0.5
     found = promise(replace(numbers, result=result), DISTANCE)
     assert found.bounds["xtilde"] == pytest.approx(expected, rel=1e-12)
-    assert found.decay.defect == pytest.approx(c["plan_defect_metric"] + 0.6)
+    assert found.decay.defect == pytest.approx(c.sup("plan_defect_metric") + 0.6)
 
 
 def test_pushes_are_bounded_where_metric_and_inputs_are_constant(numbers):
     """B'M gamma_s changes with x by |B| A, with t by |B| A |x*'|, and |x*'| <= |f + B u*| + |p|."""
-    assert class_of(numbers, setting("flat").model).push is None
-    none = dict.fromkeys(("M_x", "B_x"), Bound(below=0.0, above=0.0))
-    constants = {**numbers.result.constants, **none}
-    c = replace(numbers, result=replace(numbers.result, constants=constants))
-    slope = c["B"] * 1.9
-    assert class_of(c, setting("flat").model).push == pytest.approx(
-        (slope, slope * (c["drift_on_plan"] + c["plan_defect"]))
+    model, none = numbers.model, dict.fromkeys(("M_x", "B_x"), Bound(below=0.0, above=0.0))
+    constant = replace(numbers.result, constants={**numbers.result.constants, **none})
+    assert class_of(numbers.result, model, 0.4, 1.9).push is None
+    assert class_of(constant, model, 0.4, None).push is None
+    slope = numbers.sup("B") * 1.9
+    assert class_of(constant, model, 0.4, 1.9).push == pytest.approx(
+        (slope, slope * (numbers.sup("drift_on_plan") + numbers.sup("plan_defect")))
     )
-    assert class_of(replace(c, upper=None), setting("flat").model).push is None

@@ -12,9 +12,8 @@ from texts import CONFIGS
 
 from tubecert.expression import constant, sin, symbol
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulation.adaptive.engine import _Lanes, integrate
-from tubecert.simulation.adaptive.lanes import follow
-from tubecert.simulation.adaptive.loops import Cases, Disturbance, LoopGains, LoopProblem
+from tubecert.simulation.adaptive.engine import Vector, integrate
+from tubecert.simulation.adaptive.loops import Cases, Disturbance, Loop, LoopGains, Problem, of_some
 from tubecert.simulation.adaptive.times import output_times
 from tubecert.spec import Knots, load_text
 from tubecert.trajectory.pieces import piecewise_plan
@@ -53,9 +52,10 @@ def h2(t, x):
     return np.array([2 * np.sin(2 * t) + 0.1 * x[0]])
 
 
-def problem(controller, horizon=2.0, K=5, model=TWO, plan=PLAN, **options):
-    times = np.linspace(0, horizon, K)
-    return LoopProblem(model=model, plan=plan, controller=controller, horizon=horizon, times=times, **options)
+def problem(controller, horizon=2.0, K=5, model=TWO, *, plan=PLAN, gains=None, **options):
+    options = {"S": np.eye(len(model.states)), "times": np.linspace(0, horizon, K)} | options
+    own = Problem(model=model, plan=plan, horizon=horizon, **options)
+    return own, Loop(controller=controller, gains=gains)
 
 
 def projection(s, y, gains):
@@ -114,7 +114,7 @@ def test_loops_agree_with_dop853(controller):
     gains = LoopGains(bandwidth=25.0, projection_radius=50.0, predictor_gain=2.0, adaptation_rate=4e4)
     case = problem(controller, gains=gains)
     z0 = np.concatenate([START[0], np.zeros(SIZES[controller])])
-    expected = dop853(right_hand_side(controller, gains), z0, case.times)
+    expected = dop853(right_hand_side(controller, gains), z0, case[0].times)
     found = alone(case, START, Disturbance.from_expressions(wavy_h(), TWO, 1), tolerance=1e-5)
     assert not found.found.stopped.any()
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
@@ -142,7 +142,7 @@ def test_a_wind_moves_the_state_and_not_what_is_predicted(controller, radius):
 
     z0 = np.concatenate([START[0], np.zeros(SIZES[controller])])
     case = problem(controller, gains=gains, E=tuple((constant(Fraction(repr(float(e)))),) for e in E))
-    expected = dop853(rate, z0, case.times, max_step=1e-3)
+    expected = dop853(rate, z0, case[0].times, max_step=1e-3)
     h = Disturbance.from_expressions(wavy_h(), TWO, 1, k=1)
     blowing = {"wind": 1.0, "blowing": [1.0], "gusting": [2.0, 0.4]}
     h = h._replace(**{name: np.array([value]).T for name, value in blowing.items()})
@@ -169,7 +169,7 @@ def test_a_wind_that_aims(aim):
     blowing = {"wind": 0.5, "aim": float(aim), "gusting": [0.0, np.pi / 2]}
     h = h._replace(**{name: np.array([value]).T for name, value in blowing.items()})
     found = alone(case, START, h, tolerance=1e-5)
-    assert np.abs(found.x[0] - dop853(rate, START[0], case.times)).max() <= found.error[0] <= 5e-5
+    assert np.abs(found.x[0] - dop853(rate, START[0], case[0].times)).max() <= found.error[0] <= 5e-5
 
 
 def scalar(f, B):
@@ -181,9 +181,8 @@ def scalar(f, B):
 
 def levels(case, x0, h, count):
     """x at the output times (K, n) for one level of steps after the other."""
-    batch = case, Cases(x0.T, Disturbance.from_expressions(h, case.model, 1))
-    lanes = _Lanes([batch], None)
-    return [follow(lanes.system(np.arange(1), j)).seen["x"][..., 0] for j in range(count)]
+    vector = Vector([(*case, Cases(x0.T, Disturbance.from_expressions(h, case[0].model, 1)))])
+    return [vector.run(vector.steps(j), np.arange(1)).seen.x[..., 0] for j in range(count)]
 
 
 ORIGIN = constant_plan([Fraction(0)], [Fraction(0)], None)
@@ -262,7 +261,7 @@ def test_state_dependent_inputs_agree_with_dop853(controller):
     case = problem(controller, model=SLANTED, gains=gains)
     start = np.array([[0.2, -0.25]])
     z0 = np.concatenate([start[0], np.zeros(SIZES[controller])])
-    expected = dop853(slanted_rate(controller, gains), z0, case.times)
+    expected = dop853(slanted_rate(controller, gains), z0, case[0].times)
     found = alone(case, start, Disturbance.from_expressions(SLANTED.h, SLANTED, 1), tolerance=1e-5)
     assert not found.found.stopped.any()
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5
@@ -295,9 +294,9 @@ def test_lanes_do_not_know_each_other():
     assert np.isnan(vector.x[7, -1]).all()
     assert np.nanmax(np.abs(vector.h)) <= 1.5 * (1 + 1e-12)
     for lane in (0, 39):
-        own = alone(case, starts[[lane]], d.of(np.array([lane])), tolerance=1e-5)
+        own = alone(case, starts[[lane]], of_some(d, np.array([lane])), tolerance=1e-5)
         assert np.allclose(own.x[0], vector.x[lane], rtol=0, atol=1e-12)  # BLAS sums in another order
-        assert own.found.peak["distance"][0] == pytest.approx(vector.found.peak["distance"][lane], abs=1e-12)
+        assert own.found.peak.distance[0] == pytest.approx(vector.found.peak.distance[lane], abs=1e-12)
 
 
 # x1' = x2 + 0.1 x1^3 escapes in finite time from far away
@@ -339,7 +338,7 @@ def test_errors_are_measured_in_the_coordinates_of_the_tube():
     """A narrow tube in one state asked for its own accuracy of all states, in whatever unit these are."""
     S = np.array([[30.0, 0.0], [2.0, 0.5]])
     still = Disturbance.from_expressions(wavy_h(), TWO, 1)
-    plain, own = (alone(problem("ccm", P=P), START, still, tolerance=1e9) for P in (None, S.T @ S))
+    plain, own = (alone(problem("ccm", S=own), START, still, tolerance=1e9) for own in (np.eye(2), S))
     assert own.x == pytest.approx(plain.x, abs=1e-13)
     change = own.error[0] / plain.error[0]
     assert np.linalg.norm(S, -2) < change < np.linalg.norm(S, 2)
@@ -361,7 +360,7 @@ def test_loops_along_several_plans_are_lanes_of_one_vector():
         plans.append(piecewise_plan(TWO, Knots(t=tuple(e for (e,) in t), x=x, u=u, interpolation="hold")))
     still = Disturbance.from_expressions(wavy_h(), TWO, 1)
     batches = [
-        (problem(name, plan=plan, gains=gains), Cases(np.asarray(START).T, still))
+        (*problem(name, plan=plan, gains=gains), Cases(np.asarray(START).T, still))
         for plan in plans
         for name in ("ccm", "l1")
     ]
@@ -395,7 +394,7 @@ def test_an_f_that_depends_on_time_agrees_with_dop853():
 
     rate = right_hand_side("l1", gains, lambda t, x: drift(x) + np.array([np.sin(3 * t), 0.5 * t]))
     case = problem("l1", horizon=1.0, model=model, gains=gains)
-    expected = dop853(rate, np.concatenate([START[0], np.zeros(4)]), case.times)
+    expected = dop853(rate, np.concatenate([START[0], np.zeros(4)]), case[0].times)
     found = alone(case, START, Disturbance.from_expressions(wavy_h(), model, 1), tolerance=1e-5)
     assert not found.found.stopped.any()
     assert np.abs(found.x[0] - expected[:, :2]).max() <= found.error[0] <= 5e-5

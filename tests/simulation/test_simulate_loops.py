@@ -15,7 +15,7 @@ from systems import F_TWO, W_TWO, matrix_of, plain_model
 
 from tubecert.expression import cos, sin, symbol
 from tubecert.model import ControlAffineModel
-from tubecert.simulation.adaptive.loops import Disturbance, LoopGains, LoopProblem
+from tubecert.simulation.adaptive.loops import Disturbance, Loop, LoopGains, Problem
 from tubecert.spec import Knots
 from tubecert.trajectory.pieces import piecewise_plan
 
@@ -198,12 +198,12 @@ def compared(case, loop, inputs, *, span, K, tolerance=1e-5):
     knots = course(case, inputs, span)
     horizon = float(knots[0][-1])
     times, plan = np.linspace(0, horizon, K), planned(case, *knots)
-    problem = LoopProblem(
-        model=case.model, plan=plan, controller=controller, horizon=horizon, times=times, gains=gains
-    )
+    problem = Problem(model=case.model, plan=plan, horizon=horizon, times=times, S=np.eye(len(case.B)))
     start = knots[1][0] + np.linspace(0.2, -0.1, len(case.B))
     disturbance = Disturbance.from_expressions(case.h_terms, case.model, 1)
-    found = alone(problem, start[None], disturbance, tolerance=tolerance)
+    found = alone(
+        (problem, Loop(controller=controller, gains=gains)), start[None], disturbance, tolerance=tolerance
+    )
     assert not found.found.stopped.any()
     assert found.error[0] <= 5 * tolerance
     return found, Reference(case, controller, gains, knots).run(start, times)
@@ -274,17 +274,12 @@ def test_no_run_of_a_sliding_estimate_is_further_off_than_it_tells():
     gains = LoopGains(bandwidth=10.0, projection_radius=RADIUS, predictor_gain=2.0, adaptation_rate=300.0)
     knots = course(TWO_INPUTS, PAIRS[:2], 0.4)
     times = np.linspace(0, 0.8, 5)
-    problem = LoopProblem(
-        model=TWO_INPUTS.model,
-        plan=planned(TWO_INPUTS, *knots),
-        controller="l1",
-        horizon=0.8,
-        times=times,
-        gains=gains,
+    problem = Problem(
+        model=TWO_INPUTS.model, plan=planned(TWO_INPUTS, *knots), horizon=0.8, times=times, S=np.eye(3)
     )
     starts = knots[1][0] + np.random.default_rng(1).uniform(-0.4, 0.4, (20, 3))
     found = alone(
-        problem,
+        (problem, Loop(controller="l1", gains=gains)),
         starts,
         Disturbance.from_expressions(TWO_INPUTS.h_terms, TWO_INPUTS.model, 20),
         tolerance=1e-3,

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulated import setting
 
-from tubecert.simulation.adaptive.attack import bred, cases
+from tubecert.simulation.adaptive.campaign import bred, cases
 from tubecert.simulation.adaptive.uncertainty import WAVES, Class, adversaries, random_members, triangle
 
 bounds = st.floats(0.0, 10.0).map(lambda value: 0.0 if value < 1e-3 else value)

@@ -16,7 +16,7 @@ from tubecert.report.text import screen
 from tubecert.simulation.adaptive.campaign import SPECIFIED, Campaign, Followed, simulate
 from tubecert.simulation.adaptive.continuous import DIVERGED, reason
 from tubecert.simulation.adaptive.judge import compare
-from tubecert.simulation.adaptive.loops import Disturbance, LoopProblem
+from tubecert.simulation.adaptive.loops import Disturbance, Loop, Problem
 from tubecert.simulation.adaptive.setting import Choice, loop_of
 from tubecert.trajectory import constant_plan
 
@@ -27,19 +27,19 @@ PLAN = constant_plan([0, 0], [0], None)
 def loop(*, horizon=6.0, limit=1e6):
     W = matrix_of([["1", "-1/2"], ["-1/2", "1"]], ())
     plain = plain_model(("x1", "x2"), ("x2", "-x1 - x2"), [["0"], ["1"]])
-    return LoopProblem(
+    return Problem(
         model=replace(plain, W=W, rate=Fraction(2, 5)),
         plan=PLAN,
-        controller="ccm",
         horizon=horizon,
         times=np.linspace(0, horizon, 101),
         limit=limit,
+        S=np.eye(2),
     )
 
 
 def run(problem, start=(0.1, 0.0)):
     h = Disturbance.from_expressions((exp(3 * T),), problem.model, 1)
-    return alone(problem, np.array([start]), h, tolerance=1e-3)
+    return alone((problem, Loop(controller="ccm")), np.array([start]), h, tolerance=1e-3)
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_a_state_beyond_the_limit_is_not_followed():
     for found, limit in ((near, 200), (far, 20_000)):
         (why,), (end,) = found.found.stopped, found.found.ended
         assert f"|x - x*| exceeds {limit}" in reason(why, limit)
-        assert limit / 3 < found.found.peak["deviation"][0] <= limit
+        assert limit / 3 < found.found.peak.deviation[0] <= limit
         assert np.isnan(found.x[0, found.t > end + 0.1]).all()
         ends.append(end)
     assert ends[0] < ends[1] < 6

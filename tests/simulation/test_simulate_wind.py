@@ -11,8 +11,7 @@ from simulated import FLAT, alone
 from systems import SMALL
 
 from tubecert.simulation.adaptive import engine
-from tubecert.simulation.adaptive.attack import cases
-from tubecert.simulation.adaptive.campaign import simulate
+from tubecert.simulation.adaptive.campaign import cases, simulate
 from tubecert.simulation.adaptive.judge import compare
 from tubecert.simulation.adaptive.loops import Disturbance
 from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
@@ -39,13 +38,13 @@ def loop(kind):
 def test_a_run_is_that_of_the_plant_with_its_parameters():
     """The feedback alone against scipy: x' = f(x, theta) + B (k - what is told of h) written out."""
     setting = stirred("none")
-    problem = replace(loop("none"), times=np.linspace(0, 2, 5), horizon=2.0)
+    case = replace(setting, times=np.linspace(0, 2, 5), horizon=2.0), loop("none")
     model = setting.model
     still = Disturbance.from_expressions(None, model, 1, 1)
     theta = np.array([[0.31], [0.02]])
     moved = still._replace(theta=theta)
     x0 = np.array([[0.05, 0.0]])
-    found = alone(problem, x0, moved, tolerance=1e-5)
+    found = alone(case, x0, moved, tolerance=1e-5)
     M = np.linalg.inv(np.array([[1, -0.3], [-0.3, 2]]))
     B = np.array([0.0, 1.0])
 
@@ -58,9 +57,9 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
         k = -grown / (B @ m) if grown > 0 else 0.0
         return f(x) + B * k + np.array([0.02 * np.cos(x[0]), 0.0])  # what no input reaches
 
-    own = solve_ivp(slope, (0, 2), x0[0], rtol=1e-10, atol=1e-12, t_eval=problem.times)
+    own = solve_ivp(slope, (0, 2), x0[0], rtol=1e-10, atol=1e-12, t_eval=case[0].times)
     np.testing.assert_allclose(found.x[0], own.y.T, atol=1e-5)
-    at_rest = alone(problem, x0, still, tolerance=1e-5)
+    at_rest = alone(case, x0, still, tolerance=1e-5)
     assert np.abs(at_rest.x - found.x).max() > 1e-3
 
 
@@ -68,7 +67,7 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
 def test_no_bound_is_exceeded_by_adversaries_whose_parameters_differ():
     setting, own = stirred("B"), loop("B")
     drawn = cases(setting, 3, range(60))
-    (runs,) = engine.integrate([(own, drawn)], tolerance=setting.tolerance)
+    (runs,) = engine.integrate([(setting, own, drawn)], tolerance=setting.tolerance)
     found = compare(setting, runs, own.promise)
     assert own.promise is not None
     assert not found.violations
@@ -85,7 +84,7 @@ def test_a_wind_blows_on_the_loop_of_b_and_breaks_nothing():
     text = FLAT + "disturbance: {E: [[1, 0], [0, 1]], bound: 1/100}\n"
     setting = setting_of(load_text(text), proven.result(text, bare=True, conditions="all"))
     own = loop_of(setting, "l1", Choice())
-    assert own.promise.decay.defect > 0.009 * setting["wind_push"] > 0  # the plan has none
+    assert own.promise.decay.defect > 0.009 * setting.sup("wind_push") > 0  # the plan has none
     (found,) = simulate(setting, [own], count=15, seed=2).attacks
     assert found.adversary.comparison.worst["distance"].share > 0.1
     for comparison in (found.random.comparison, found.adversary.comparison):

@@ -23,7 +23,7 @@ from tubecert.executor import Cluster, Serial, WorkerError
 from tubecert.expression import parse, symbol
 from tubecert.libraries import versions
 from tubecert.simulation.adaptive import campaign
-from tubecert.simulation.adaptive.attack import cases
+from tubecert.simulation.adaptive.campaign import cases
 from tubecert.simulation.adaptive.setting import Choice, loop_of
 from tubecert.trajectory import constant_plan
 from tubecert.tube import Tube
@@ -155,7 +155,7 @@ def test_random_runs_on_a_cluster_are_those_of_this_machine(cluster, monkeypatch
         for each in (Serial(), Cluster(cluster[0]))
     )
     np.testing.assert_array_equal(here.x, there.x)
-    np.testing.assert_array_equal(here.found.peak["distance"], there.found.peak["distance"])
+    np.testing.assert_array_equal(here.found.peak.distance, there.found.peak.distance)
 
 
 def test_files_are_checked_on_a_cluster(cluster, tmp_path):

@@ -12,7 +12,7 @@ from tubecert.report.page import Block, Facts, Page, Reason, Section, Table, Wor
 if TYPE_CHECKING:
     from tubecert.simulation.adaptive.campaign import Campaign, Followed
     from tubecert.simulation.adaptive.judge import Comparison
-    from tubecert.simulation.adaptive.setting import Loop
+    from tubecert.simulation.adaptive.loops import Loop
     from tubecert.simulation.told import Clearance, RunAt, Stopped, Violation, Went
 
 CAVEAT: Final = "A simulation can falsify a certificate, it never supports one."

@@ -20,6 +20,12 @@ def vectors_of(count: int, first: int, size: int) -> list[range]:
     return [range(a, b) for a, b in pairwise([0, *range(first, count, size), count])]
 
 
+def tell(report: Progress | None, name: str, done: int, of: int) -> None:
+    """How many runs of so many are done, to whom wants to know."""
+    if report is not None:
+        report(Step(phase=Phase.SIMULATION, name=name, done=done, of=of))
+
+
 def finished(
     work: Callable[[range], R],
     vectors: Sequence[range],
@@ -29,16 +35,13 @@ def finished(
 ) -> list[R]:
     """What work makes of all vectors; of an interruption what comes before the first one that is missing, if any."""
     found: dict[int, R] = {}
-
-    def tell(done: int) -> None:
-        if report is not None:
-            report(Step(phase=Phase.SIMULATION, name=name, done=done, of=sum(map(len, vectors))))
+    count = sum(map(len, vectors))
 
     def ready(place: int, made: R) -> None:
         found[place] = made
-        tell(sum(len(vectors[each]) for each in found))
+        tell(report, name, sum(len(vectors[each]) for each in found), count)
 
-    tell(0)
+    tell(report, name, 0, count)
     try:
         executor.map(work, vectors, ready)
     except KeyboardInterrupt:

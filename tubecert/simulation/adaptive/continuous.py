@@ -11,8 +11,9 @@ factor methods for stiff PDEs, J. Comput. Phys. 203, 2005.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import groupby
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import pairwise
 from math import log
 from typing import Final, NamedTuple
 
@@ -21,27 +22,102 @@ from numpy.typing import NDArray
 
 from tubecert.digits import near
 from tubecert.enclosure.interval import Array
-from tubecert.simulation.adaptive.acting import Acting
+from tubecert.enclosure.tape import Tape
+from tubecert.expression import ZERO, Expression
+from tubecert.expression.matrix import Matrix
+from tubecert.model import TIME, ControlAffineModel
 from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, times
 from tubecert.simulation.adaptive.geodesics import FOUND, REASONS, Geodesic, Geodesics
-from tubecert.simulation.adaptive.loops import Batch, Disturbance
+from tubecert.simulation.adaptive.loops import Found, Lanes, LoopGains, Problem, Seen, Sizes, mapped
 from tubecert.simulation.adaptive.times import END, MIDDLE, START, Grid, Reference
-from tubecert.simulation.plans import SHARES
-from tubecert.trajectory import Plan
+from tubecert.simulation.plans import SHARES, stepped
 
 INFEASIBLE: Final = 10
 DIVERGED: Final = 20
 _NOTHING: Final = 1e-300  # so small that nothing is divided by less
 _ROUNDING: Final = 1e-12
 _SIDES: Final = (START, MIDDLE, MIDDLE, END)  # of a step, stage by stage
+_STEEP: Final = 3.0  # how much more than a sine the wave of a wind is a square
+_THIN: Final = 0.05  # of the layer: where a wind that aims turns round
+_CHUNK: Final = 64  # steps whose peaks are taken at once
 
 
-class _Group(NamedTuple):
-    """Lanes whose fast part is the same, and its flows by the logarithm of the step's length, where B is constant."""
+class _Instant(NamedTuple):
+    """Lanes at the start of a step, two sizes `within` the step before, (2, N), and which of them are `alive`."""
 
-    lanes: slice
-    fast: Fast
-    flows: dict[float, Flow]
+    seen: Seen
+    within: Array
+    alive: NDArray[np.bool_]
+
+
+@lru_cache(maxsize=4)
+def _tapes(
+    model: ControlAffineModel, base: tuple[Expression, ...] | None, E: Matrix, rest: Matrix
+) -> tuple[Tape, Tape]:
+    """f, base h, E, the rest and, where it moves, B, of t, states and parameters; B alone. Kept for the next level."""
+    inputs = (TIME, *model.states, *dict(model.parameters))
+    B, nothing = [entry for row in model.B for entry in row], [ZERO] * len(model.inputs)
+    beside = [row[0] for row in rest] or [ZERO] * len(model.f)
+    outputs = [*model.f, *(base or nothing), *(e for row in E for e in row), *beside]
+    return Tape([*outputs, *([] if model.constant_input else B)], inputs), Tape(B, inputs)
+
+
+class Acting:
+    """The plant of lanes, and their disturbances."""
+
+    def __init__(self, problem: Problem, lanes: Lanes) -> None:
+        model, E, rest = problem.model, problem.E, problem.rest
+        n, m, k = self._sizes = len(model.states), len(model.inputs), len(E[0]) if E else 0
+        self._lanes, self._own = lanes, lanes.h
+        self._plant, self._input = _tapes(model, lanes.h.base, E, rest)
+        nothing = [np.zeros(())] * len(self._input.inputs)
+        self._B = self._input.run_floats(nothing, ()).reshape(n, m) if model.constant_input else None
+        ends = np.cumsum([0, n, m, n * k, n, n * m * (self._B is None)]).tolist()
+        self._parts = [slice(a, b) for a, b in pairwise(ends)]
+        self._pushes, self._blows = bool(self._own.push.any()), bool(self._own.wind.any())
+        self._clips = bool(np.isfinite(self._own.radius).any())
+        self._theta = np.zeros((len(model.parameters), len(lanes.based)))
+        self._theta[: len(self._own.theta)] = self._own.theta
+
+    def terms(self, t: float, x: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """f (n, N), B (n, m, N) or constant (n, m), the base of h (m, N), E (n, k, N), the rest (n, N), at x (n, N).
+
+        The rest is what unknown parameters do that no input can.
+        """
+        (n, m, k), N = self._sizes, x.shape[1]
+        values = self._plant.run_floats_silenced([np.array(t), *x, *self._theta], (N,))
+        f, base, E, rest, B = (values[part] for part in self._parts)
+        B, base = B.reshape(n, m, N) if self._B is None else self._B, base * self._lanes.based
+        return f, B, base, E.reshape(n, k, N), rest * self._lanes.unknown
+
+    def input(self, t: float, x: Array) -> Array:
+        """B alone, where it moves."""
+        values = self._input.run_floats_silenced([np.array(t), *x, *self._theta], x.shape[1:])
+        return values.reshape(*self._sizes[:2], -1)
+
+    def h(self, t: float, x: Array, h: Array, push: Array) -> Array:
+        """h (m, N) at x (n, N), from its base; `push` (m, N) is B'M gamma_s."""
+        own = self._own
+        if len(own.phase):
+            angle = own.frequency * t + np.einsum("win,in->wn", own.wave, x) + own.phase
+            h += np.einsum("wjn,wn->jn", own.amplitude, np.sin(angle))
+        if self._pushes:
+            h += own.push / np.sqrt(np.einsum("jn,jn->n", push, push) + own.layer**2) * push
+        if self._clips:
+            size = np.sqrt(np.einsum("jn,jn->n", h, h))
+            h *= np.minimum(1.0, own.radius / np.maximum(size, _NOTHING))
+        return np.asarray(h)
+
+    def wind(self, t: float, E: Array, pushes: tuple[Array, Array]) -> Array | float:
+        """E w (n, N); `pushes`: M gamma_s and B B'M gamma_s."""
+        if not self._blows:
+            return 0.0
+        own, aims = self._own, [(E * way[:, None]).sum(axis=0) for way in pushes]
+        w = np.where(own.aim == 0, own.blowing, np.where(own.aim == 1, *aims))
+        square = np.where(own.aim > 0, (_THIN * own.layer) ** 2, 0.0) + (w**2).sum(axis=0)
+        wave = np.clip(_STEEP * np.sin(own.gusting[0] * t + own.gusting[1]), -1.0, 1.0)
+        share = np.where(square > 0, own.wind * wave / np.sqrt(square), 0.0)
+        return np.asarray((E * (share * w)).sum(axis=1))
 
 
 def reason(stopped: int, limit: float) -> str:
@@ -54,99 +130,163 @@ def reason(stopped: int, limit: float) -> str:
 
 
 class Continuous:
-    """The lanes of some batches on a grid, for `lanes.follow`: peaks are taken of their `sizes`.
+    """Some lanes on a grid, once from start to end; `loops`: whether they adapt, and the gains of their filters.
 
-    `kept` stays, of what is seen, at the output times. `stopped` (N,) is 0 for the lanes that go on; the others may
-    have any values. Above 0 it is why they failed.
+    `_stopped` (N,) is 0 for the lanes that go on; the others may have any values. Above 0 it is why they failed.
 
     `_y` (Y, N) is the fast part of every lane at the start of the step (`flows.blocks`); in `_known` behind it stands h
     at every stage, with E w after it where one blows, (F, N), and in `_B` B (n, m, N) or (n, m).
     """
 
-    kept = ("x", "off", "slope", "u", "k", "u_a", "sigma_hat", "h", "xtilde", "distance")
-
-    def __init__(self, batches: Sequence[Batch], grid: Grid, plans: Sequence[Plan]) -> None:
-        first = batches[0][0]
-        n, m = len(first.model.states), len(first.model.inputs)
-        problems = [problem for problem, cases in batches for _ in cases.start.T]
-        self.grid, self._N = grid, len(problems)
-        self._decay = 2 * float(first.model.rate)
-        self._P = np.eye(n) if first.P is None else first.P
-        self._x0 = np.hstack([cases.start for _, cases in batches])
-        acting = [
-            Disturbance.nothing(n, m, cases.start.shape[1]) if problem.controller == "nominal" else cases.h
-            for problem, cases in batches
-        ]
-        self._acting = Acting(acting, first.model, first.E, first.rest)
-        self._geodesics = Geodesics(first.model, first.degree, self._N)
-        self._at, self._blown = blocks(n, m), bool(first.E or first.rest)
+    def __init__(
+        self, problem: Problem, loops: Sequence[tuple[bool, LoopGains | None]], lanes: Lanes, grid: Grid
+    ) -> None:
+        (n, N), m, self._P = lanes.start.shape, len(problem.model.inputs), problem.P
+        self._grid, self._start = grid, lanes.start
+        self._plans = lanes.plan if grid.plan.x.shape[-1] > 1 else None
+        self._decay, self._far = 2 * float(problem.model.rate), problem.limit**2
+        self._acting, self._geodesics = Acting(problem, lanes), Geodesics(problem.model, problem.degree, N)
+        self._at, self._blown = blocks(n, m), bool(problem.E or problem.rest)
         self._forces = m + n * self._blown
-        places = {id(plan): place for place, plan in enumerate(plans)}
-        self._plans = np.array([places[id(own.plan)] for own in problems]) if len(plans) > 1 else None
-        self._far = np.array([own.limit for own in problems]) ** 2
-        self._predicts = np.array([own.adapts for own in problems])
-        self._roots, self._groups, end = np.ones(self._N), list[_Group](), 0
-        for (adapts, gains), group in groupby(
-            problems, key=lambda own: (own.adapts, own.filters and own.gains)
-        ):
-            lanes = slice(end, end := end + len([*group]))
+        self._known = np.zeros((self._at.end + len(_SIDES) * self._forces, N))
+        self._y, self._within = self._known[: self._at.end], np.zeros((2, N))
+        self._fast, self._flows = list[tuple[slice, Fast]](), dict[float, list[Flow]]()
+        self._predicts, self._roots = np.zeros(N, dtype=bool), np.ones(N)
+        for a, b in pairwise([0, *(np.flatnonzero(np.diff(lanes.loop)) + 1).tolist(), N]):
+            self._predicts[a:b], gains = loops[lanes.loop[a]]
             if gains:
-                self._groups.append(_Group(lanes, Fast(adapts, gains, self._P, m, self._forces), {}))
-                self._roots[lanes] = self._groups[-1].fast.root
-        self.stopped = np.zeros(self._N, dtype=np.int64)
+                fast = Fast(bool(self._predicts[a]), gains, self._P, m, self._forces)
+                self._fast.append((slice(a, b), fast))
+                self._roots[a:b] = fast.root
+        self._stopped, self._ended = np.zeros(N, dtype=np.int64), np.full(N, np.nan)
+        self._B, self._own, self._rows = list[Array](), list[Flow](), list[_Instant]()
 
-    def start(self) -> Array:
-        """x (n, N) at the start."""
-        self.stopped[:] = FOUND
-        self._known = np.zeros((self._at.end + len(_SIDES) * self._forces, self._N))
-        self._y, self._within = self._known[: self._at.end], np.zeros((2, self._N))
-        self._B, self._own = list[Array](), list[Flow]()
-        return self._x0.copy()
+    def followed(self) -> Found:
+        """What is found: peaks over all steps, and what is seen at the output times."""
+        x, last = self._start, len(self._grid.length) - 1
+        with np.errstate(all="ignore"):
+            for step, length in enumerate(self._grid.length.tolist()):
+                self._step = step
+                slope = self._slope(0, x)
+                if step == 0:
+                    found = self._nothing(self._rows[0].seen)
+                if step < last:
+                    x = stepped(self._slope, x, length, slope) + self._flowed()
+                over = step == last or self._stopped.all()
+                if over or len(self._rows) == _CHUNK:
+                    self._keep(found, mapped(lambda *each: np.stack(each), *self._rows))
+                    self._rows.clear()
+                if over:
+                    break
+        return found
 
-    def at(self, step: int, stage: int, x: Array) -> Array:
-        """f + B(u* + k + h) + E w (n, N); what u_a has added to x meanwhile is added here."""
-        t = float(self.grid.start[step] + SHARES[stage] * self.grid.length[step])
-        plan = self._plan(step, _SIDES[stage])
+    def _nothing(self, seen: Seen) -> Found:
+        """What is found before the first step, of which this is seen."""
+        N, inputs, sizes = len(self._stopped), seen.u.shape, len(Sizes._fields)
+        return Found(
+            seen=mapped(lambda part: np.full((len(self._grid.outputs), *part.shape), np.nan), seen),
+            peak=Sizes(*np.full((sizes, N), -np.inf)),
+            peak_time=Sizes(*np.zeros((sizes, N))),
+            least=np.full(inputs, np.inf),
+            greatest=np.full(inputs, -np.inf),
+            stopped=self._stopped,
+            ended=self._ended,
+            error=np.full(N, np.inf),
+            unresolved=np.full(N, np.nan),
+            steps=np.full(N, len(self._grid.start) - 1),
+        )
+
+    def _keep(self, found: Found, own: _Instant) -> None:
+        """Peaks of S instants (S, .., N), up to the one of the moment, and those of them that are at output times."""
+        alive, live, end = own.alive, own.alive[:, None], self._step + 1
+        first, lanes = end - len(alive), np.arange(alive.shape[1])
+        for size, peak, time in zip(self._sizes(own), found.peak, found.peak_time, strict=True):
+            alone = np.where(alive, size, -np.inf)
+            best = np.argmax(alone, axis=0)
+            higher = alone[best, lanes] > peak
+            peak[higher] = alone[best, lanes][higher]
+            time[higher] = self._grid.start[first + best[higher]]
+        np.minimum(found.least, np.where(live, own.seen.u, np.inf).min(axis=0), out=found.least)
+        np.maximum(found.greatest, np.where(live, own.seen.u, -np.inf).max(axis=0), out=found.greatest)
+        low, high = np.searchsorted(self._grid.outputs, [first, end])
+        at = self._grid.outputs[low:high] - first
+        for seen, part in zip(found.seen, own.seen, strict=True):
+            seen[low:high] = np.where(alive[at] if part.ndim == 2 else live[at], part[at], np.nan)
+
+    def _sizes(self, own: _Instant) -> Sizes:
+        """Of S instants, (S, N). xtilde and sigma_hat may turn often in a step: theirs are the largest since before."""
+        seen, length = own.seen, self._length
+        error = np.where(self._predicts, _norm(seen.sigma_hat - seen.h), 0.0)
+        return Sizes(
+            distance=seen.distance,
+            deviation=length(seen.off),
+            u=_norm(seen.u),
+            k=_norm(seen.k),
+            xtilde=np.maximum(length(seen.xtilde), own.within[:, 0]),
+            sigma_error=np.maximum(error, own.within[:, 1]),
+            speed=length(seen.slope),
+        )
+
+    def _length(self, z: Array) -> Array:
+        """|S z| of (S, n, N), in the coordinates of the tube."""
+        return np.asarray(np.sqrt(np.maximum((z * (self._P @ z)).sum(axis=1), 0.0)))
+
+    def _slope(self, stage: int, x: Array) -> Array:
+        """f + B(u* + k + h) + E w (n, N) at a stage of the step; what u_a has added to x meanwhile is added here."""
+        t = float(self._grid.start[self._step] + SHARES[stage] * self._grid.length[self._step])
+        plan = Reference(
+            *(part[self._step, _SIDES[stage]] for part in self._grid.plan)
+        )  # (.., 1) if that is one
+        if self._plans is not None:
+            plan = Reference(*(part[:, self._plans] for part in plan))
         if stage == 0:
             self._B.clear()
-        elif self._groups:
-            x = x + self._flown(step, stage, x)
+        elif self._fast:
+            x = x + self._flown(stage, x)
         x = self._near(x, plan.x)
-        terms = self._acting.terms(t, x)
+        f, B, base, E, rest = self._acting.terms(t, x)
         geodesic = self._geodesics.connect(plan.x, x)
         self._stop(geodesic.status != FOUND, geodesic.status)
-        ahead = terms.f + times(terms.B, plan.u)
-        push = _reached(terms.B, geodesic.end)
+        ahead = f + times(B, plan.u)
+        push = _reached(B, geodesic.end)
         k = self._feedback(plan, ahead, push, geodesic)
-        h = self._acting.h(t, x, terms.base, push)
-        slope = ahead + times(terms.B, k + h)
+        h = self._acting.h(t, x, base, push)
+        slope = ahead + times(B, k + h)
         first = self._at.end + stage * self._forces
         self._known[first : first + len(h)] = h
-        self._B.append(terms.B)
+        self._B.append(B)
         if self._blown:
-            wind = self._acting.wind(t, terms, (geodesic.end, times(terms.B, push)))
+            wind = rest + self._acting.wind(t, E, (geodesic.end, times(B, push)))
             self._known[first + len(h) : first + self._forces] = wind
             slope += wind
         if stage == 0:
-            distance = np.sqrt(np.maximum(geodesic.energy, 0.0))
-            seen = {"x": x, "off": x - plan.x, "k": k, "h": h, "u": plan.u + k, "distance": distance}
-            self._seen = seen
+            _, sigma_hat, u_a, _ = (self._y[own].copy() for own in self._at[:-1])
+            seen = Seen(
+                x=x,
+                off=x - plan.x,
+                slope=slope + times(B, u_a),
+                u=plan.u + k + u_a,
+                k=k,
+                u_a=u_a,
+                sigma_hat=sigma_hat,
+                h=h,
+                xtilde=self._y[self._at.xi] / self._roots,
+                distance=np.sqrt(np.maximum(geodesic.energy, 0.0)),
+            )
+            self._rows.append(_Instant(seen, self._within.copy(), self._stopped == FOUND))
         return slope
-
-    def _plan(self, step: int, side: int) -> Reference:
-        """The plans of all lanes, (.., 1) if that is one."""
-        found = (part[step, side] for part in self.grid.plan)
-        return Reference(*(found if self._plans is None else (part[:, self._plans] for part in found)))
 
     def _near(self, x: Array, plan: Array) -> Array:
         """x, and the plan for lanes that are stopped because they are nowhere near it, or were before."""
         off = x - plan
         self._stop(~(np.einsum("in,in->n", off, off) <= self._far), DIVERGED)  # not for nan
-        return np.where(self.stopped, plan, x) if self.stopped.any() else x
+        return np.where(self._stopped, plan, x) if self._stopped.any() else x
 
     def _stop(self, lanes: NDArray[np.bool_], why: NDArray[np.int64] | int) -> None:
         if lanes.any():
-            self.stopped[:] = np.where(lanes & (self.stopped == FOUND), why, self.stopped)
+            new = lanes & (self._stopped == FOUND)
+            self._ended[new] = self._grid.start[self._step]
+            self._stopped[:] = np.where(new, why, self._stopped)
 
     def _feedback(self, plan: Reference, ahead: Array, push: Array, geodesic: Geodesic) -> Array:
         """k (m, N) of (0.5); `ahead` is f(x) + B(x)u*, `push` is phi_1/2."""
@@ -157,79 +297,41 @@ class Continuous:
             self._stop((reach == 0) & (phi > _ROUNDING * (np.abs(lost) + np.abs(gained))), INFEASIBLE)
         return np.asarray(np.minimum(-phi, 0.0) / (2 * np.maximum(reach, _NOTHING)) * push)
 
-    def _flown(self, step: int, stage: int, x: Array) -> Array:
+    def _flown(self, stage: int, x: Array) -> Array:
         """What u_a has added to the slow state until a stage (n, N); it is V times the mean of B so far."""
         if stage == 1:
-            self._prepare(step, x)
-        V = np.zeros((self._at.V.stop - self._at.V.start, self._N))
-        for group, flow in zip(self._groups, self._own, strict=True):
-            known = self._known[: self._at.end + stage * self._forces, group.lanes]
-            V[:, group.lanes] = group.fast.idle(flow, group.fast.ahead(known), whole=stage == 3)
+            self._own = self._flows_of(x, float(self._grid.length[self._step]))
+        V = np.zeros((self._at.V.stop - self._at.V.start, len(self._stopped)))
+        for (lanes, fast), flow in zip(self._fast, self._own, strict=True):
+            known = self._known[: self._at.end + stage * self._forces, lanes]
+            V[:, lanes] = fast.idle(flow, fast.ahead(known), whole=stage == 3)
         return times(self._B[-1], V)
 
-    def _prepare(self, step: int, x: Array) -> None:
-        """The flows of a step: those of B at its middle, where x comes but for u_a."""
-        length, level = float(self.grid.length[step]), self.grid.level
-        t, B = float(self.grid.start[step]) + length / 2, self._B[0]
+    def _flows_of(self, x: Array, length: float) -> list[Flow]:
+        """Those of the step, for B at its middle, where x comes but for u_a."""
+        level, B = self._grid.level, self._B[0]
         if B.ndim == 3:
-            B = self._acting.input(t, x + length / 2 * times(B, self._y[self._at.u_a]))
-            self._own = [group.fast.flow(B[..., group.lanes], length, level) for group in self._groups]
-            return
+            t, u_a = float(self._grid.start[self._step]) + length / 2, self._y[self._at.u_a]
+            B = self._acting.input(t, x + length / 2 * times(B, u_a))
+            return [fast.flow(B[..., lanes], length, level) for lanes, fast in self._fast]
         same = round(log(length), 10)  # lengths that differ by rounding are one
-        for group in self._groups:
-            if same not in group.flows:
-                group.flows[same] = group.fast.flow(B, length, level)
-        self._own = [group.flows[same] for group in self._groups]
+        if same not in self._flows:
+            self._flows[same] = [fast.flow(B, length, level) for _, fast in self._fast]
+        return self._flows[same]
 
-    def step(self, step: int) -> Array | float:
-        """Takes the fast part to the end of a step; what u_a has added to x."""
-        if not self._groups:
+    def _flowed(self) -> Array | float:
+        """Takes the fast part to the end of the step; what u_a has added to x."""
+        if not self._fast:
             return 0.0
-        for group, flow in zip(self._groups, self._own, strict=True):
-            z = group.fast.ahead(self._known[:, group.lanes])
-            self._y[:, group.lanes], self._within[:, group.lanes] = group.fast.advance(flow, z)
+        for (lanes, fast), flow in zip(self._fast, self._own, strict=True):
+            z = fast.ahead(self._known[:, lanes])
+            self._y[:, lanes], self._within[:, lanes] = fast.advance(flow, z)
         a, b, c, d = self._B
         moved = times(a if a.ndim == 2 else (a + 2 * (b + c) + d) / 6, self._y[self._at.V])
         self._y[self._at.V] = 0.0
-        if self.stopped.any():
-            self._y[:, self.stopped != FOUND] = 0.0
+        if self._stopped.any():
+            self._y[:, self._stopped != FOUND] = 0.0
         return moved
-
-    def instant(self, slope: Array) -> dict[str, Array]:
-        """What is seen of the lanes at the start of a step; `off` is x - x*, `within` what the step before had seen."""
-        at, y = self._at, self._y
-        u_a = y[at.u_a].copy()
-        return {
-            **self._seen,
-            "u_a": u_a,
-            "sigma_hat": y[at.sigma_hat].copy(),
-            "xtilde": y[at.xi] / self._roots,
-            "u": self._seen["u"] + u_a,
-            "slope": slope + times(self._B[0], u_a),
-            "within": self._within.copy(),
-        }
-
-    def sizes(self, rows: Mapping[str, Array]) -> dict[str, Array]:
-        """What peaks are taken of, (S, N), from what was seen at S instants, (S, .., N).
-
-        d(x*, x), |S (x - x*)|, |u|, |k|, |S xtilde|, |sigma_hat - h|, |S x'|. xtilde and sigma_hat may turn often in a
-        step: theirs are the largest since the step before.
-        """
-        length, error = self._length, np.where(self._predicts, _norm(rows["sigma_hat"] - rows["h"]), 0.0)
-        xtilde, within = length(rows["xtilde"]), np.moveaxis(rows["within"], 1, 0)
-        return {
-            "distance": rows["distance"],
-            "deviation": length(rows["off"]),
-            "u": _norm(rows["u"]),
-            "k": _norm(rows["k"]),
-            "xtilde": np.maximum(xtilde, within[0]),
-            "sigma_error": np.maximum(error, within[1]),
-            "speed": length(rows["slope"]),
-        }
-
-    def _length(self, z: Array) -> Array:
-        """|S z| of (S, n, N), in the coordinates of the tube."""
-        return np.asarray(np.sqrt(np.maximum((z * (self._P @ z)).sum(axis=1), 0.0)))
 
 
 def _norm(z: Array) -> Array:

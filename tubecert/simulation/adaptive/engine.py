@@ -6,7 +6,8 @@ lost in one step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -14,9 +15,8 @@ from numpy.typing import NDArray
 
 from tubecert.enclosure.interval import Array
 from tubecert.simulation.adaptive.continuous import Continuous
-from tubecert.simulation.adaptive.lanes import Found, combined, follow, of_some
-from tubecert.simulation.adaptive.loops import Batch, Runs
-from tubecert.simulation.adaptive.times import START, steps
+from tubecert.simulation.adaptive.loops import Batch, Found, Runs, lanes_of, of_some, put
+from tubecert.simulation.adaptive.times import START, Grid, steps
 
 Places = NDArray[np.intp]
 _LEVELS: Final = 7  # of steps: the last ones are 2^6 times shorter than the first
@@ -33,68 +33,69 @@ _ESTIMATE: Final = 0.02  # of R_H, 1 % of what bounds |sigma_hat - h|: what sigm
 def integrate(batches: Sequence[Batch], *, tolerance: float, count: int | None = None) -> tuple[Runs, ...]:
     """The runs of every batch, all as lanes of one vector, to an error of about `tolerance` in |S x|, P = S'S.
 
-    Batches are of the same model and times. A lane that diverges or has no geodesic is stopped, and the others go on.
-    With a `count` of steps runs are proposals whose error is not known (inf), seen at their ends alone.
+    Batches are of the same problem, but for its plan. A lane that diverges or has no geodesic is stopped, and the
+    others go on. With a `count` of steps runs are proposals whose error is not known (inf), seen at their ends alone.
     """
-    lanes = _Lanes(batches, count)
-    best = _resolved(lanes, tolerance) if count is None else follow(lanes.system(np.arange(lanes.N), 0))
-    runs = list[Runs]()
-    for (problem, _), a, b in lanes.parts():
-        plan = next(i for i, each in enumerate(lanes.plans) if each is problem.plan)
-        x, u = (each[lanes.grid.outputs, START, :, plan] for each in (lanes.grid.plan.x, lanes.grid.plan.u))
-        runs.append(Runs(t=lanes.times, x_plan=x, u_plan=u, found=of_some(best, slice(a, b))))
+    vector = Vector(batches, count)
+    lanes = np.arange(vector.ends[-1])
+    best = vector.run(vector.grid, lanes) if count else _resolved(vector, lanes, tolerance)
+    t, plans, runs = vector.times, vector.grid.plan, list[Runs]()
+    for a, b in pairwise(vector.ends):
+        x, u = (own[vector.grid.outputs, START, :, vector.lanes.plan[a]] for own in (plans.x, plans.u))
+        runs.append(Runs(t=t, x_plan=x, u_plan=u, found=of_some(best, lanes[a:b])))
     return tuple(runs)
 
 
-class _Lanes:
-    """The lanes of all batches, which can be run in the steps of any level; `grid` is that of the first."""
+class Vector:
+    """The lanes of all batches, which end before `ends`, with the `grid` of their first level."""
 
-    def __init__(self, batches: Sequence[Batch], count: int | None) -> None:
-        first = batches[0][0]
-        self._batches, self._P = batches, first.P
-        self.plans = list({id(problem.plan): problem.plan for problem, _ in batches}.values())
-        self._ends = np.cumsum([0, *(own.start.shape[1] for _, own in batches)]).tolist()
-        self.N, self.times = self._ends[-1], first.times if count is None else np.array([0.0, first.horizon])
-        self.grid = steps(first, 0, self.plans, count)
-        gains = [problem.gains for problem, _ in batches]
-        radius = [np.inf if own is None else own.projection_radius for own in gains]
-        self._room = np.repeat(radius, np.diff(self._ends)) * _ESTIMATE
+    def __init__(self, batches: Sequence[Batch], count: int | None = None) -> None:
+        self._problem, gains = batches[0][0], [loop.gains for _, loop, _ in batches]
+        self.times = self._problem.times if count is None else np.array([0.0, self._problem.horizon])
+        self._plans = {id(problem.plan): problem.plan for problem, *_ in batches}
+        loops = [(loop.adapts, loop.gains if loop.filters else None) for _, loop, _ in batches]
+        self._loops, places = [*dict.fromkeys(loops)], [*self._plans]
+        self.lanes = lanes_of(
+            batches,
+            [*map(self._loops.index, loops)],
+            [places.index(id(problem.plan)) for problem, *_ in batches],
+        )
+        sizes = [cases.start.shape[1] for *_, cases in batches]
+        self.ends = np.cumsum([0, *sizes]).tolist()
+        self._room = _ESTIMATE * np.repeat([own.projection_radius if own else np.inf for own in gains], sizes)
+        self.grid = self.steps(0, count)
 
-    def parts(self) -> list[tuple[Batch, int, int]]:
-        """Every batch with its first lane, and the one after its last."""
-        return list(zip(self._batches, self._ends, self._ends[1:], strict=False))
+    def steps(self, level: int, count: int | None = None) -> Grid:
+        """Those of a level."""
+        return steps(self._problem, level, [*self._plans.values()], count)
 
-    def system(self, lanes: Places, level: int) -> Continuous:
-        """Some of the lanes at a level."""
-        some = [(batch, lanes[(lanes >= a) & (lanes < b)] - a) for batch, a, b in self.parts()]
-        grid = steps(self._batches[0][0], level, self.plans) if level else self.grid
-        own = [(problem, cases.of(each)) for (problem, cases), each in some if len(each)]
-        return Continuous(own, grid, self.plans)
+    def run(self, grid: Grid, lanes: Places) -> Found:
+        """Some of the lanes."""
+        return Continuous(self._problem, self._loops, of_some(self.lanes, lanes), grid).followed()
 
     def apart(self, lanes: Places, finer: Found, coarser: Found) -> tuple[Array, Array]:
         """|S x| of differences (K, N), and those of sigma_hat and its peak, of the room that they have, (N,)."""
-        z = finer.seen["x"] - coarser.seen["x"]
-        square = (z * (z if self._P is None else self._P @ z)).sum(axis=1)
-        moved = np.sqrt(((finer.seen["sigma_hat"] - coarser.seen["sigma_hat"]) ** 2).sum(axis=1)).max(axis=0)
+        z, turned = (getattr(finer.seen, name) - getattr(coarser.seen, name) for name in ("x", "sigma_hat"))
+        moved = np.sqrt((turned**2).sum(axis=1)).max(axis=0)
         with np.errstate(invalid="ignore"):  # lanes that were stopped at once have no peak
-            peaks = np.abs(finer.peak["sigma_error"] - coarser.peak["sigma_error"])
+            peaks = np.abs(finer.peak.sigma_error - coarser.peak.sigma_error)
+        square = (z * (self._problem.P @ z)).sum(axis=1)
         return np.sqrt(np.maximum(square, 0.0)), np.maximum(moved, peaks) / self._room[lanes]
 
 
-def _resolved(vector: _Lanes, tolerance: float) -> Found:
+def _resolved(vector: Vector, lanes: Places, tolerance: float) -> Found:
     """All lanes, level after level of those that are not done.
 
     What is told of a lane's error is at most five tolerances, or it cannot be integrated so far. It is given up as soon
     as halving its steps no longer helps, which is so where the loop itself amplifies every difference.
     """
-    lanes = np.arange(vector.N)
-    best = follow(vector.system(lanes, 0))
-    changes = np.full((_LEVELS, vector.N), np.inf)
-    failed = np.zeros((_LEVELS, vector.N), dtype=bool)
+    best = vector.run(vector.grid, lanes)
+    changes = np.full((_LEVELS, len(lanes)), np.inf)
+    failed = np.zeros(changes.shape, dtype=bool)
     failed[0] = best.stopped > 0
     for level in range(1, _LEVELS):
-        system, whole = vector.system(lanes, level), len(lanes) == vector.N
-        coarser, finer = best if whole else of_some(best, lanes), follow(system)
+        grid, coarser = vector.steps(level), of_some(best, lanes)
+        finer = vector.run(grid, lanes)
         apart, beside = vector.apart(lanes, finer, coarser)
         change = np.nan_to_num(apart.max(axis=0), nan=np.inf)
         failed[level, lanes], changes[level, lanes] = finer.stopped > 0, change
@@ -103,9 +104,9 @@ def _resolved(vector: _Lanes, tolerance: float) -> Found:
         beyond = ~(apart <= tolerance)
         first = vector.times[np.argmax(beyond, axis=0)]
         finer.unresolved[:] = np.where(beyond.any(axis=0), first, np.nan)
-        best = finer if whole else combined([best, finer], _put(lanes))
+        put(best, lanes, finer)
         agree = np.abs(finer.ended - coarser.ended) <= _AGREEING * vector.times[-1]
-        agree &= failed[level - 1, lanes] & (np.searchsorted(system.grid.start, finer.ended) >= _LIVED)
+        agree &= failed[level - 1, lanes] & (np.searchsorted(grid.start, finer.ended) >= _LIVED)
         near = (told <= _ENOUGH * tolerance) & (beside <= 1)
         done = np.where(failed[level, lanes], agree, near)
         if level >= _DOUBTFUL:
@@ -114,17 +115,6 @@ def _resolved(vector: _Lanes, tolerance: float) -> Found:
         if not len(lanes):
             break
     return best
-
-
-def _put(lanes: Places) -> Callable[[Array, Array], Array]:
-    """What replaces some lanes of an array by those of another."""
-
-    def put(whole: Array, part: Array) -> Array:
-        whole = whole.copy()
-        whole[..., lanes] = part
-        return whole
-
-    return put
 
 
 def _hopeless(changes: Array, failed: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -11,8 +11,8 @@ from tubecert.digits import near
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.simulation.adaptive.campaign import Campaign
-from tubecert.simulation.adaptive.loops import Runs
-from tubecert.simulation.adaptive.setting import Loop, Setting
+from tubecert.simulation.adaptive.loops import Loop, Runs
+from tubecert.simulation.adaptive.setting import Setting
 from tubecert.simulation.figures import COLORS, TUBE, blank, images, labelled, names_of, titled
 from tubecert.simulation.figures import plane as plane_of
 from tubecert.simulation.folder import npz
@@ -44,11 +44,11 @@ def _arrays(campaign: Campaign) -> Iterator[tuple[str, Array]]:
         yield from _named(item.loop.controller, item.runs)
     for attack in campaign.attacks:
         if attack.adversary is not None:
-            yield from _named(f"{attack.loop.controller}_adversary", attack.adversary.runs)
-        prefix, runs = f"{attack.loop.controller}_sample", attack.random.runs
+            yield from _named(f"{attack.random.loop.controller}_adversary", attack.adversary.runs)
+        prefix, runs = f"{attack.random.loop.controller}_sample", attack.random.runs
         yield from ((f"{prefix}_{name}", getattr(runs, name)) for name in ("t", "distance", "x", "error"))
         yield f"{prefix}_start", runs.x[:, 0]
-        yield from ((f"{prefix}_largest_{name}", peak) for name, peak in runs.found.peak.items())
+        yield from ((f"{prefix}_largest_{name}", peak) for name, peak in runs.found.peak._asdict().items())
 
 
 def _named(prefix: str, runs: Runs) -> Iterator[tuple[str, Array]]:
@@ -148,7 +148,7 @@ def _tube_use(campaign: Campaign) -> Figure:
         if attack.adversary is not None:
             worst = attack.adversary.runs
             share = worst.distance[0] / reach
-            _draw(axis, attack.loop, worst.t, share, "worst adversary, ", lw=1.0, alpha=0.5)
+            _draw(axis, attack.random.loop, worst.t, share, "worst adversary, ", lw=1.0, alpha=0.5)
     axis.axhspan(0, 1, color=TUBE, alpha=0.18, lw=0)
     axis.axhline(1, color=TUBE, lw=1.0)
     axis.set_ylim(0, min(1.06 * most, _FARTHEST))
@@ -161,7 +161,7 @@ def _monte_carlo(campaign: Campaign) -> Figure | None:
     if not campaign.attacks:
         return None
     (attack,), reach = campaign.attacks, campaign.setting.reach
-    figure, color, runs = blank(7.0, 3.6), COLORS[attack.loop.controller], attack.random.runs
+    figure, color, runs = blank(7.0, 3.6), COLORS[attack.random.loop.controller], attack.random.runs
     axis, share = figure.subplots(), runs.distance / reach
     alive = ~np.isnan(share).all(axis=0)
     t, share = runs.t[alive], share[:, alive]
@@ -172,8 +172,8 @@ def _monte_carlo(campaign: Campaign) -> Figure | None:
     if attack.adversary is not None:
         worst = attack.adversary.runs
         axis.plot(worst.t, worst.distance[0] / reach, color="black", lw=1.0, label="worst adversary")
-    if attack.loop.promise is not None and attack.loop.promise.decay is not None:
-        bound = attack.loop.promise.decay(t) / reach
+    if attack.random.loop.promise is not None and attack.random.loop.promise.decay is not None:
+        bound = attack.random.loop.promise.decay(t) / reach
         axis.plot(t, bound, color=TUBE, lw=1.4, ls="--", label="certified D(t)")
     axis.axhline(1, color=TUBE, lw=1.2, label="tube")
     axis.set_ylim(0, min(max(1.08, 1.05 * float(np.nanmax(share))), _FARTHEST))

@@ -22,7 +22,7 @@ from tubecert.expression import Expression, derivatives
 from tubecert.findings import Finding
 from tubecert.model import TIME
 from tubecert.simulation.adaptive.continuous import reason
-from tubecert.simulation.adaptive.loops import Runs
+from tubecert.simulation.adaptive.loops import Runs, Sizes
 from tubecert.simulation.adaptive.reading import Promise
 from tubecert.simulation.adaptive.setting import Setting
 from tubecert.simulation.obstacles import in_plane, signed_distance
@@ -32,7 +32,6 @@ from tubecert.verdict import Verdict
 
 _USABLE: Final = 1e-2  # of rho: a run with a larger error estimate is no result
 _EXACT: Final = 1e-6  # what rounding may add to a bound that is met with equality
-_SHOWN: Final = ("distance", "deviation", "k", "u", "xtilde", "sigma_error", "speed")
 _LISTED: Final = 20  # of the runs that left, stopped or came to nothing
 _POINTS: Final = 2001  # of a curve, whose distances from obstacles are taken
 
@@ -80,10 +79,10 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
     """
     peak, usable = runs.found.peak, runs.error <= _USABLE * setting.rho
     room = _EXACT + np.where(usable, runs.error, 0.0) / setting.rho
-    left = usable & (peak["deviation"] > setting.rho * (1 + room))
-    left |= usable & (peak["distance"] > setting.reach * (1 + room))
+    left = usable & (peak.deviation > setting.rho * (1 + room))
+    left |= usable & (peak.distance > setting.reach * (1 + room))
     why, ended = runs.found.stopped, runs.found.ended
-    left |= (why != 0) & (peak["deviation"] > 2 * setting.rho)
+    left |= (why != 0) & (peak.deviation > 2 * setting.rho)
     deviation = np.linalg.norm(runs.off @ setting.S.T, axis=2)
     own = _Judged(setting, runs, usable, left, room, deviation)
     bounds = promise.bounds if promise else {"distance": setting.reach, "deviation": setting.rho}
@@ -100,7 +99,7 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
             Stopped(run=lane, t=_finite(ended[lane]), reason=reason(int(why[lane]), setting.limit))
             for lane in np.flatnonzero(why)[:_LISTED].tolist()
         ),
-        worst={name: _peak(own, name, bounds.get(name)) for name in _SHOWN} if any_usable else {},
+        worst={name: _peak(own, name, bounds.get(name)) for name in Sizes._fields} if any_usable else {},
         violations=tuple(_violations(own, promise)) if promise else (),
         settled=_settled(own, promise.ultimate if promise else None),
         error_estimate=float(np.max(runs.error[usable], initial=0.0)),
@@ -109,9 +108,10 @@ def compare(setting: Setting, runs: Runs, promise: Promise | None) -> Comparison
 
 
 def _peak(own: _Judged, name: str, bound: float | None) -> Peak:
-    peak, found = own.runs.found.peak[name], own.runs.found
+    found = own.runs.found
+    peak, times = getattr(found.peak, name), getattr(found.peak_time, name)
     lane = int(np.argmax(np.where(own.usable, peak, -np.inf)))
-    value, t = float(peak[lane]), float(found.peak_time[name][lane])
+    value, t = float(peak[lane]), float(times[lane])
     return Peak(value=value, bound=bound, share=value / bound if bound else None, run=lane, t=t)
 
 
@@ -121,7 +121,7 @@ def _first_exit(own: _Judged) -> RunAt | None:
     if not len(lanes):
         return None
     beyond = (own.deviation > own.setting.rho) | (own.runs.distance > own.setting.reach)
-    peaks = own.runs.found.peak_time["deviation"]
+    peaks = own.runs.found.peak_time.deviation
     at = np.where(beyond.any(axis=1), own.runs.t[np.argmax(beyond, axis=1)], peaks)
     lane = int(lanes[np.argmin(at[lanes])])
     return RunAt(run=lane, t=float(at[lane]))
@@ -152,8 +152,8 @@ def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
     runs, found, spec = own.runs, own.runs.found, own.setting.spec
     never = np.full(len(own.left), np.nan)  # when an input was at its end is not known
     for name, bound in promise.bounds.items():
-        words, when = "tube" if name == "distance" else name, found.peak_time[name]
-        yield from _broken(own, words, found.peak[name], bound, bound, when)
+        words, when = "tube" if name == "distance" else name, getattr(found.peak_time, name)
+        yield from _broken(own, words, getattr(found.peak, name), bound, bound, when)
     rows = [*np.eye(len(spec.states)), *(np.array([*map(float, output.row)]) for output in spec.outputs)]
     for name, row in zip((*spec.states, *(output.name for output in spec.outputs)), rows, strict=True):
         width, away = promise.half_widths[name], np.abs(runs.off @ row)
@@ -166,7 +166,7 @@ def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
     if promise.decay is not None:
         yield from _over_time(own, "D(t)", runs.distance, promise.decay(runs.t), own.setting.reach)
     for lane in np.flatnonzero((found.stopped != 0) & own.left).tolist():
-        t, value, rho = float(found.ended[lane]), float(found.peak["deviation"][lane]), own.setting.rho
+        t, value, rho = float(found.ended[lane]), float(found.peak.deviation[lane]), own.setting.rho
         yield Violation(of="tube", run=lane, t=t, value=value, bound=rho, share=value / rho)
 
 

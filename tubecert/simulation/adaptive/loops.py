@@ -1,4 +1,4 @@
-"""Closed loops, what acts on every lane of one (one lane is one run), and the runs that come out.
+"""Closed loops, what acts on every lane of a vector (one lane is one run), and what runs leave behind.
 
 | controller | the filter's u_a' | beside it |
 |---|---|---|
@@ -9,9 +9,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal, NamedTuple, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,11 @@ from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression
 from tubecert.expression.matrix import Matrix
 from tubecert.model import ControlAffineModel
-from tubecert.simulation.adaptive.lanes import Found, combined
+from tubecert.records import to_json
+from tubecert.simulation.adaptive.reading import Promise
 from tubecert.trajectory import Plan
 
+R = TypeVar("R")
 Controller = Literal["nominal", "ccm", "reference", "l1"]
 CONTROLLERS: Final[tuple[Controller, ...]] = ("nominal", "ccm", "reference", "l1")
 
@@ -42,27 +44,14 @@ class LoopGains:
     smooth: float | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LoopProblem:
-    """One closed loop over [0, horizon] in s.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """A closed loop, what its gains are, and the promise about it, if there is one."""
 
-    `E` (n, k) is that of the wind E w, `rest` (n, 1) what unknown parameters do that no input can. `times` (K,) are the
-    output times. `degree` is that of the geodesics' polynomials (unused if W is constant). A lane is stopped where
-    |x - x*| exceeds `limit`. `P` (n, n) is S'S of the coordinates z = S x in which the adaptation is designed, None for
-    those of x; |xtilde| and |x - x*| are lengths in z.
-    """
-
-    model: ControlAffineModel
-    plan: Plan
     controller: Controller
-    horizon: float
-    times: Array
     gains: LoopGains | None = None
-    degree: int = 5
-    limit: float = 1e6
-    P: Array | None = None
-    E: Matrix = ()
-    rest: Matrix = ()
+    gains_are: str = "no adaptation"
+    promise: Promise | None = None
 
     @property
     def adapts(self) -> bool:
@@ -73,6 +62,43 @@ class LoopProblem:
     def filters(self) -> bool:
         """Whether there is u_a."""
         return self.controller in ("reference", "l1")
+
+    @property
+    def covered(self) -> bool:
+        """Whether a certificate is about it."""
+        return self.promise is not None
+
+    @property
+    def data(self) -> dict[str, object]:
+        """What is told of it."""
+        told = {"controller": self.controller, "gains_are": self.gains_are}
+        gains = {} if self.gains is None else {"gains": to_json(self.gains)}
+        return told | {"covered": self.covered, "tested": self.adapts} | gains
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Problem:
+    """What loops have in common: a plant along a plan over [0, horizon] in s.
+
+    `E` (n, k) is that of the wind E w, `rest` (n, 1) what unknown parameters do that no input can. `times` (K,) are the
+    output times. `degree` is that of the geodesics' polynomials (unused if W is constant). A lane is stopped where
+    |x - x*| exceeds `limit`. The adaptation is designed in z = S x, `S` (n, n); |xtilde| and |x - x*| are lengths in z.
+    """
+
+    model: ControlAffineModel
+    plan: Plan
+    horizon: float
+    times: Array
+    S: Array
+    degree: int = 5
+    limit: float = 1e6
+    E: Matrix = ()
+    rest: Matrix = ()
+
+    @property
+    def P(self) -> Array:
+        """S'S, (n, n)."""
+        return np.asarray(self.S.T @ self.S)
 
 
 class Disturbance(NamedTuple):
@@ -103,10 +129,6 @@ class Disturbance(NamedTuple):
     gusting: Array
     theta: Array
 
-    def of(self, lanes: NDArray[np.intp]) -> Disturbance:
-        """That of some lanes, given by their numbers."""
-        return Disturbance(self.base, *(part[..., lanes] for part in self[1:]))
-
     @classmethod
     def from_expressions(
         cls, base: tuple[Expression, ...] | None, model: ControlAffineModel, lanes: int, k: int = 0
@@ -128,22 +150,126 @@ class Cases(NamedTuple):
     start: Array
     h: Disturbance
 
-    def of(self, lanes: NDArray[np.intp]) -> Cases:
-        """Some of them, given by their numbers."""
-        return Cases(self.start[:, lanes], self.h.of(lanes))
+
+Batch: TypeAlias = tuple[Problem, Loop, Cases]  # runs of a loop
 
 
-Batch: TypeAlias = tuple[LoopProblem, Cases]  # runs of a loop
+class Lanes(NamedTuple):
+    """N runs of some batches, one after the other.
+
+    `loop` and `plan` (N,) are numbers in lists. Which have the base of h, and unknown parameters, is 0 or 1.
+    """
+
+    start: Array
+    h: Disturbance
+    loop: NDArray[np.intp]
+    plan: NDArray[np.intp]
+    based: Array
+    unknown: Array
+
+
+def lanes_of(batches: Sequence[Batch], loops: Sequence[int], plans: Sequence[int]) -> Lanes:
+    """The lanes of batches with such loops and plans; where some have more waves than others the rest is 0."""
+    starts, acting = [cases.start for *_, cases in batches], []
+    for (_, loop, cases), (n, N) in zip(batches, (start.shape for start in starts), strict=True):
+        h = Disturbance.nothing(n, cases.h.amplitude.shape[1], N) if loop.controller == "nominal" else cases.h
+        acting.append(h)
+    base, *others = dict.fromkeys(h.base for h in acting if h.base is not None) or [None]
+    if others:
+        raise ValueError("lanes of one vector have one base of h")
+    flags = ([float(h.base is not None) for h in acting], [float(len(h.theta) > 0) for h in acting])
+    each = (np.repeat(own, [start.shape[1] for start in starts]) for own in (loops, plans, *flags))
+    joint = (_padded(own) for own in zip(*(h[1:] for h in acting), strict=True))
+    return Lanes(np.hstack(starts), Disturbance(base, *joint), *each)
+
+
+def _padded(parts: Sequence[Array]) -> Array:
+    """Arrays (.., N) one after the other; where they are of unequal size the rest is 0."""
+    shape = np.max([part.shape[:-1] for part in parts], axis=0).astype(int)
+    rooms = [[*((0, most) for most in shape - part.shape[:-1]), (0, 0)] for part in parts]
+    return np.concatenate([np.pad(*each) for each in zip(parts, rooms, strict=True)], axis=-1)
+
+
+def mapped(how: Callable[..., Array | None], *records: R) -> R:
+    """A record with what `how` makes of the arrays of several of its kind, and of those of records within."""
+    first: Any = records[0]
+    if isinstance(first, np.ndarray):
+        first = how(*records)
+    elif hasattr(first, "_fields"):
+        first = type(first)(*(mapped(how, *each) for each in zip(*records, strict=True)))
+    return cast("R", first)
+
+
+def of_some(record: R, lanes: NDArray[np.intp]) -> R:
+    """That of some lanes."""
+    return mapped(lambda part: np.take(part, lanes, axis=-1), record)
+
+
+def put(record: R, lanes: NDArray[np.intp], other: R) -> None:
+    """Takes some lanes from another."""
+    mapped(lambda whole, part: whole.__setitem__((..., lanes), part), record, other)
+
+
+class Seen(NamedTuple):
+    """N lanes at an instant, or at several (K, .., N).
+
+    x, x - x* = `off`, x' = `slope` and `xtilde` (n, N); u = u* + k + u_a, `k`, `u_a`, `sigma_hat`, `h` (m, N);
+    `distance` (N,), the Riemannian d(x*, x). What a loop does not have is 0.
+    """
+
+    x: Array
+    off: Array
+    slope: Array
+    u: Array
+    k: Array
+    u_a: Array
+    sigma_hat: Array
+    h: Array
+    xtilde: Array
+    distance: Array
+
+
+class Sizes(NamedTuple):
+    """What peaks are taken of, (N,): d(x*, x), |S (x - x*)|, |u|, |k|, |S xtilde|, |sigma_hat - h|, |S x'|."""
+
+    distance: Array
+    deviation: Array
+    u: Array
+    k: Array
+    xtilde: Array
+    sigma_error: Array
+    speed: Array
+
+
+class Found(NamedTuple):
+    """What N lanes leave behind.
+
+    `seen` (K, .., N) at the output times, nan where they did not come; `peak` (-inf where there is none), `peak_time`;
+    `least` and `greatest` (m, N) of the inputs; why (0: it was not) and when in s a lane was `stopped`, `ended` (N,).
+    `error` (N,) is twice the largest difference of states to the run with steps twice as long, or an eighth of the
+    difference before: mostly far above the true one; inf where it is not known, or the lane failed. `unresolved` (N,)
+    is the first output time at which that difference exceeds the tolerance, nan where it never does; `steps` (N,) how
+    many there were.
+    """
+
+    seen: Seen
+    peak: Sizes
+    peak_time: Sizes
+    least: Array
+    greatest: Array
+    stopped: NDArray[np.int64]
+    ended: Array
+    error: Array
+    unresolved: Array
+    steps: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Runs:
     """N runs at K output times.
 
-    `t` (K,), `x_plan` (K, n), `u_plan` (K, m). What was seen is an attribute, too, with the lanes first: x, x - x* =
-    `off`, x' = `slope` and `xtilde` (N, K, n), `k`, `u_a`, `sigma_hat`, `h` and u = u* + k + u_a (N, K, m), `distance`
-    (N, K), the Riemannian d(x*, x). A quantity that a loop does not have is 0. Peaks over all steps are in `found`, as
-    are the ends of inputs and the errors. After a lane was stopped its values are nan.
+    `t` (K,), `x_plan` (K, n), `u_plan` (K, m). What was `Seen` is an attribute, too, with the lanes first: x (N, K, n),
+    u (N, K, m), distance (N, K), ... After a lane was stopped its values are nan.
     """
 
     t: Array
@@ -152,9 +278,9 @@ class Runs:
     found: Found
 
     def __getattr__(self, name: str) -> Array:
-        if name == "found" or name not in self.found.seen:
+        if name not in Seen._fields:
             raise AttributeError(name)
-        return np.moveaxis(self.found.seen[name], -1, 0)
+        return np.moveaxis(getattr(self.found.seen, name), -1, 0)
 
     @property
     def error(self) -> Array:
@@ -163,11 +289,12 @@ class Runs:
 
     def with_only(self, names: Sequence[str]) -> Runs:
         """The same without what else was seen: many of them fit into memory."""
-        seen = {name: self.found.seen[name] for name in names}
-        return replace(self, found=self.found._replace(seen=seen))
+        seen = self.found.seen
+        dropped = {name: np.zeros((0, len(self.error))) for name in Seen._fields if name not in names}
+        return replace(self, found=self.found._replace(seen=seen._replace(**dropped)))
 
 
 def joined(parts: Sequence[Runs]) -> Runs:
     """Runs at the same times, one after the other; lanes are numbered through."""
-    found = combined([part.found for part in parts], lambda *each: np.concatenate(each, axis=-1))
+    found = mapped(lambda *each: np.concatenate(each, axis=-1), *(part.found for part in parts))
     return replace(parts[0], found=found)

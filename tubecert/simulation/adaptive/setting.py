@@ -1,16 +1,23 @@
-"""What is simulated: plan, times, starts, what a certificate proves; loops, their gains, and what they promise."""
+"""What is simulated: plan, times, starts, what a certificate proves; loops, their gains, and what they promise.
+
+Implements: theory 4, the bounds D(t), |k| <= du dbar, |xtilde| <= Dxt/sqrt(Gamma), |sigma_hat - h| <= Dh + R_H.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from tubecert.bounds.wind import Beside
+from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
+from tubecert.conditions.distance import DistanceRecipe
+from tubecert.conditions.rates import RateRecipe
 from tubecert.coordinates import Coordinates, Fields
 from tubecert.digits import near
 from tubecert.enclosure.interval import Array
@@ -19,15 +26,15 @@ from tubecert.errors import TubecertError
 from tubecert.expression import Expression
 from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.findings import Finding
-from tubecert.kinds import DISTANCE, name_of
+from tubecert.kinds import DISTANCE, Name, name_of
 from tubecert.model import ControlAffineModel, build
-from tubecert.records import to_json
-from tubecert.simulation.adaptive.loops import Controller, LoopGains, LoopProblem
-from tubecert.simulation.adaptive.reading import Certified, Promise, certified_plan, promise
+from tubecert.simulation.adaptive.loops import Controller, Loop, LoopGains, Problem
+from tubecert.simulation.adaptive.reading import Decay, Gains, Promise, certified_plan, sup
 from tubecert.simulation.adaptive.times import output_times
 from tubecert.simulation.adaptive.uncertainty import Class, class_of
 from tubecert.spec import Spec
 from tubecert.trajectory import Plan
+from tubecert.verdict import Verdict
 
 CHOSEN: Final = "chosen, not certified"
 _TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
@@ -37,26 +44,24 @@ _EVEN, _EVEN_DEGREE = 1.01, 3  # where M varies by a factor of less over the tub
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Setting(Certified):
-    """Everything that the loops share, beside what is certified.
+class Setting(Problem):
+    """Everything that loops share, and what is certified of it.
 
-    `x0` (n,), `centre` = x*(0), radius `within` of allowed starts, or 0; `spread` (n,): how far from x0 they may be,
-    state by state. `E` (n, k) is that of the wind, `rest` (n, 1) what unknown parameters do that no input can.
-    `uncertainty` is the class of what may act.
+    `reach` is dbar = sqrt(a) rho; `half_widths` by state and output. `x0` (n,), `centre` = x*(0), radius `within` of
+    allowed starts, or 0; `spread` (n,): how far from x0 they may be, state by state. `uncertainty` is the class of what
+    may act, `h` the specification's.
     """
 
     spec: Spec
-    model: ControlAffineModel
-    plan: Plan
-    horizon: float
-    times: Array
+    result: Result
+    rho: float
+    reach: float
+    half_widths: Mapping[str, float]
     x0: Array
     centre: Array
     within: float
     spread: Array
     uncertainty: Class
-    E: Matrix
-    rest: Matrix
     h: tuple[Expression, ...] | None
 
     @property
@@ -78,16 +83,6 @@ class Setting(Certified):
         return replace(self, plan=plan, x0=start, centre=start)
 
     @property
-    def greatest_radius(self) -> float:
-        """|x - x*| is at most this where |S (x - x*)| <= rho."""
-        return self.rho * float(np.linalg.norm(np.linalg.inv(self.S), 2))
-
-    @property
-    def limit(self) -> float:
-        """Where |x - x*| is more than this a run is not followed any more."""
-        return _LIMIT * self.greatest_radius
-
-    @property
     def tolerance(self) -> float:
         """The error of |S x| that the integrator is asked for."""
         return _TOLERANCE * self.rho
@@ -97,6 +92,22 @@ class Setting(Certified):
         """Bounds of |x_i - x_i*| in the tube, (n,)."""
         return np.array([self.half_widths[name] for name in self.spec.states])
 
+    def sup(self, name: str, otherwise: float | None = None) -> float:
+        """The safe side of a constant."""
+        return sup(self.result, name, otherwise)
+
+    def beside(self, what: Literal["push", "size"]) -> float:
+        """What a wind of the size given, and unknown parameters, do: beta_w |w| + beta_r, or D_E |w| + D_r."""
+        wind = self.result.claim.wind
+        size = 0.0 if wind is None else float(Fraction(wind.bound))
+        return size * self.sup(f"wind_{what}", 0.0) + self.sup(f"residual_{what}", 0.0)
+
+    def proven(self, name: Name) -> Gains | None:
+        """The gains of a kind with the numbers of their proof, if it is certified."""
+        section, recipe = self.result.sections.get(name.key), self.result.proof.of.get(name.key)
+        certified = section is not None and section.verdict is Verdict.CERTIFIED
+        return recipe if certified and isinstance(recipe, (RateRecipe, DistanceRecipe)) else None
+
 
 def setting_of(
     spec: Spec, result: Result, duration: Fraction | None = None, plan: Plan | None = None
@@ -105,25 +116,39 @@ def setting_of(
 
     Raises `TubecertError` where the certificate lacks what is needed, or the plan is too short.
     """
-    model, certified = build(spec), Certified.of(result)
+    tube, metric = result.tube, result.metric
+    if tube is None or tube.half_widths is None or metric is None or metric.lower is None:
+        raise incomplete("that is simulated", "it has no tube")
+    model, rows, rho = build(spec), tube.coordinates, float(tube.rho)
+    coordinates = None if rows is None else Coordinates(tuple(tuple(map(Fraction, row)) for row in rows))
+    S = np.eye(len(model.states)) if coordinates is None else np.array(coordinates.rows, dtype=float)
     single = certified_plan(spec, model, result) if plan is None else plan
-    horizon = horizon_of(spec, duration)
+    horizon, centre, field = horizon_of(spec, duration), _start_of(single), Fields(model, coordinates)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
-    centre, field = _start_of(single), Fields(model, _coordinates(result))
+    reach = math.sqrt(metric.lower.below) * rho
+    upper = metric.upper.above if metric.upper and math.isfinite(metric.upper.above) else None
+    # a S'S <= M <= A S'S with nearly the same a and A over the tube: geodesics hardly bend there
+    even = upper is not None and upper <= _EVEN * (reach / rho) ** 2
     return Setting(
-        **{item.name: getattr(certified, item.name) for item in fields(Certified)},
-        spec=spec,
         model=model,
         plan=single,
         horizon=horizon,
         times=output_times(single, horizon),
+        degree=_EVEN_DEGREE if even else _DEGREE,
+        limit=_LIMIT * rho * float(np.linalg.norm(np.linalg.inv(S), 2)),
+        S=S,
+        E=_wind(model, field),
+        rest=_rest(model, field),
+        spec=spec,
+        result=result,
+        rho=rho,
+        reach=reach,
+        half_widths=tube.half_widths,
         x0=centre if plan is not None else np.array([float(value) for value in spec.x0]),
         centre=centre,
         within=0.0 if spec.within is None else float(spec.within),
         spread=np.array([float(high - low) / 2 for low, high in spec.start_box] or [0.0] * len(spec.x0)),
-        uncertainty=class_of(certified, model),
-        E=_wind(model, field),
-        rest=_rest(model, field),
+        uncertainty=class_of(result, model, reach, upper),
         h=None if wanted is None else tuple(term.expression for term in wanted),
     )
 
@@ -143,11 +168,6 @@ def horizon_of(spec: Spec, duration: Fraction | None) -> float:
 def _start_of(plan: Plan) -> Array:
     """x*(0), (n,)."""
     return Tape(plan.start, ()).run_floats([], ())
-
-
-def _coordinates(result: Result) -> Coordinates | None:
-    rows = None if result.tube is None else result.tube.coordinates
-    return None if rows is None else Coordinates(tuple(tuple(map(Fraction, row)) for row in rows))
 
 
 def _rest(model: ControlAffineModel, fields: Fields) -> Matrix:
@@ -175,26 +195,6 @@ class Choice:
     adaptation_rate: Fraction | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Loop(LoopProblem):
-    """A closed loop beside what its gains are, and the promise about it, if there is one."""
-
-    gains_are: str
-    promise: Promise | None
-
-    @property
-    def covered(self) -> bool:
-        """Whether a certificate is about it."""
-        return self.promise is not None
-
-    @property
-    def data(self) -> dict[str, object]:
-        """What is told of it."""
-        told = {"controller": self.controller, "gains_are": self.gains_are}
-        gains = {} if self.gains is None else {"gains": to_json(self.gains)}
-        return told | {"covered": self.covered, "tested": self.adapts} | gains
-
-
 def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
     """A loop with its gains; raises `TubecertError` if there are none for it."""
     if setting.model.gained:
@@ -202,34 +202,16 @@ def loop_of(setting: Setting, controller: Controller, choice: Choice) -> Loop:
         message = "parameters known by ranges stand in B, and the loops are stated for a known B"
         help = "give each of them one value: --set system.parameters.NAME=VALUE"
         raise TubecertError([Finding(code="TC705", message=message, location=where, help=help)])
-    loop = Loop(
-        model=setting.model,
-        plan=setting.plan,
-        controller=controller,
-        horizon=setting.horizon,
-        times=setting.times,
-        limit=setting.limit,
-        degree=_EVEN_DEGREE if _even(setting) else _DEGREE,
-        P=setting.S.T @ setting.S,
-        E=setting.E,
-        rest=setting.rest,
-        gains_are="no adaptation",
-        promise=None,
-    )
+    loop, kind = Loop(controller=controller), name_of(choice.source)
     if not loop.filters:
         return loop
-    kind, (gains, covered) = name_of(choice.source), _gains(setting, loop, choice)
+    gains, covered = _gains(setting, loop, choice)
     return replace(
         loop,
         gains=gains,
         gains_are=f"certified by {kind}" if covered else CHOSEN,
         promise=promise(setting, kind) if covered and loop.adapts else None,
     )
-
-
-def _even(own: Certified) -> bool:
-    """Whether a S'S <= M <= A S'S with nearly the same a and A over the tube: geodesics hardly bend there."""
-    return own.upper is not None and own.upper <= _EVEN * (own.reach / own.rho) ** 2
 
 
 def _gains(setting: Setting, loop: Loop, choice: Choice) -> tuple[LoopGains, bool]:
@@ -256,3 +238,56 @@ def _gains(setting: Setting, loop: Loop, choice: Choice) -> tuple[LoopGains, boo
     if proven is None or bandwidth != proven.bandwidth:
         return gains, False
     return gains, not adapts or rate == proven.adaptation_rate
+
+
+def promise(setting: Setting, name: Name) -> Promise | None:
+    """What a kind of certificate promises about the adaptive loop; None if it certifies nothing."""
+    recipe, sup = setting.proven(name), setting.sup
+    if recipe is None:
+        return None
+    k = sup("feedback_gain") * setting.reach  # (2.3) |k| <= du dbar
+    radius = float(recipe.projection_radius)  # R_H
+    bounds = {
+        "distance": setting.reach,  # d(x*, x) < dbar
+        "deviation": setting.rho,  # 1.4 (i)
+        "k": k,
+        "u": sup("u_star") + k + radius,  # (0.4), |u_a| <= R_H
+        "sigma_error": sup("h") + radius,  # (2.10)
+        "xtilde": _prediction_error(setting, recipe),
+    }
+    return Promise(
+        bounds=bounds,
+        half_widths=setting.half_widths,
+        ranges={own.input: own.bounds[name.key] for own in setting.result.inputs if name.key in own.bounds},
+        ultimate=setting.result.sections[name.key].ultimate_radius,
+        decay=_decay(setting, recipe)
+        if isinstance(recipe, DistanceRecipe)
+        else None,  # A bounds the tube only
+    )
+
+
+def _prediction_error(setting: Setting, recipe: Gains) -> float:
+    """Dxt/sqrt(Gamma), (2.11): of A with its own constant Dxt; of B with s1 = Dht + Dhx Y, and (7.8) beside a wind."""
+    Gamma, sup = float(recipe.adaptation_rate), setting.sup
+    if isinstance(recipe, RateRecipe):
+        return sup("prediction_error") / math.sqrt(Gamma)
+    s1 = sup("h_t") + sup("h_x") * float(recipe.speed)
+    most, q = sup("h") + float(recipe.projection_radius), 2 * float(recipe.predictor_gain)
+    drag = setting.beside("size") / q
+    if not drag:
+        return math.sqrt((2 * most * s1 / q + most**2) / Gamma)
+    return math.hypot(most / math.sqrt(Gamma), drag + math.sqrt(drag**2 + 2 * most * s1 / (q * Gamma)))
+
+
+def _decay(setting: Setting, recipe: DistanceRecipe) -> Decay:
+    """(2.15) with H0, and S and e of the recipe."""
+    return Decay(
+        rate=float(setting.model.rate),
+        bandwidth=float(recipe.bandwidth),
+        start=setting.sup("initial_distance"),
+        beta=setting.sup("metric_input_gain"),
+        defect=setting.sup("plan_defect_metric") + setting.beside("push"),
+        first=setting.sup("h_initial"),
+        rest=float(recipe.uncertainty),
+        error=float(recipe.prediction_error),
+    )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.model import TIME
-from tubecert.simulation.adaptive.loops import LoopProblem
+from tubecert.simulation.adaptive.loops import Problem
 from tubecert.spec import Knots
 from tubecert.trajectory import Plan
 
@@ -43,7 +43,7 @@ class Grid(NamedTuple):
     plan: Reference
 
 
-def corners(problem: LoopProblem, plans: Sequence[Plan]) -> Array:
+def corners(problem: Problem, plans: Sequence[Plan]) -> Array:
     """Times (C,) that must be ends of steps."""
     end = problem.horizon
     kinks = np.concatenate([np.zeros(0), *(corners_of(plan.knots) for plan in plans if plan.knots)])
@@ -77,7 +77,7 @@ def output_times(plan: Plan, horizon: float) -> Array:
     return np.array([0.0, *inner[every - 1 :: every], horizon]) if every else np.linspace(0.0, horizon, TIMES)
 
 
-def steps(problem: LoopProblem, level: int, plans: Sequence[Plan], count: int | None = None) -> Grid:
+def steps(problem: Problem, level: int, plans: Sequence[Plan], count: int | None = None) -> Grid:
     """The steps of a level, each level with twice as many as the one before, along some plans.
 
     With a `count` so many equal ones, which pass over the corners of plans, and no output times but the ends.
@@ -99,7 +99,7 @@ def steps(problem: LoopProblem, level: int, plans: Sequence[Plan], count: int | 
     )
 
 
-def _course(problem: LoopProblem, plan: Plan, start: Array, length: Array) -> Reference:
+def _course(problem: Problem, plan: Plan, start: Array, length: Array) -> Reference:
     """A plan at start, middle and end of every step (S,), and after the last one."""
     model = problem.model
     S = len(start)

@@ -13,14 +13,16 @@ Genes (G, N) in [0, 1] describe N members, one for each lane, and what acts besi
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Final
 
 import numpy as np
 
+from tubecert.certificate.result import Result
 from tubecert.enclosure.interval import Array
 from tubecert.model import ControlAffineModel
 from tubecert.simulation.adaptive.loops import Disturbance
-from tubecert.simulation.adaptive.reading import Certified
+from tubecert.simulation.adaptive.reading import sup
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
 _ROUND: Final = 1 - 1e-9  # sums of floats stay within the class
@@ -74,22 +76,23 @@ class Class:
         return 3 + count if count else 0
 
 
-def class_of(certified: Certified, model: ControlAffineModel) -> Class:
-    """The class that a certificate is about; pushes only where the metric and B are constant."""
-    constants = {name: certified[name] for name in ("h", "h_x", "h_t", "h_initial")}
-    flat = certified["M_x"] == 0 and certified["B_x"] == 0
-    push = None
-    if flat and certified.upper is not None:
-        slope = certified["B"] * certified.upper
-        push = slope, slope * (certified["drift_on_plan"] + certified["plan_defect"])
+def class_of(result: Result, model: ControlAffineModel, reach: float, upper: float | None) -> Class:
+    """The class that a certificate is about; pushes only where metric, with lmax(M) <= `upper`, and B are constant."""
+    of, push = partial(sup, result), None
+    if of("M_x") == of("B_x") == 0 and upper is not None:
+        slope = of("B") * upper
+        push = slope, slope * (of("drift_on_plan") + of("plan_defect"))
     ranges = [[float(low), float(high)] for _, (low, high) in model.parameters]
     return Class(
-        **constants,
+        h=of("h"),
+        h_x=of("h_x"),
+        h_t=of("h_t"),
+        h_initial=of("h_initial"),
         n=len(model.states),
         m=len(model.inputs),
         push=push,
-        layer=_LAYER * certified["metric_input_gain"] * certified.reach,
-        pace=certified.rate,
+        layer=_LAYER * of("metric_input_gain") * reach,
+        pace=float(model.rate),
         k=len(model.E[0]) if model.E else 0,
         wind=float(model.wind_bound or 0),
         ranges=np.array(ranges).reshape(-1, 2),
