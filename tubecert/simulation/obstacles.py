@@ -18,34 +18,18 @@ def signed_distance(obstacle: Obstacle, points: Array) -> Array:
     if obstacle.radius is not None:
         centre = np.array([float(value) for value in obstacle.center])
         return np.asarray(np.linalg.norm(points - centre, axis=-1) - float(obstacle.radius))
-    corners = corners_of(obstacle)
-    nearest = np.min(np.stack([_to_segment(points, *edge) for edge in edges(corners)]), axis=0)
-    return np.asarray(np.where(_inside(corners, points), -nearest, nearest))
+    begin, p = corners_of(obstacle), points[..., None, :]  # edge by edge
+    end = np.roll(begin, -1, axis=0)
+    along, off = end - begin, p - begin
+    share = np.clip((off * along).sum(axis=-1) / (along**2).sum(axis=-1), 0.0, 1.0)
+    nearest = np.linalg.norm(off - share[..., None] * along, axis=-1).min(axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        at = begin[:, 0] + off[..., 1] * along[:, 0] / along[:, 1]
+        crosses = ((begin[:, 1] > p[..., 1]) != (end[:, 1] > p[..., 1])) & (p[..., 0] < at)
+    inside = crosses.sum(axis=-1) % 2 == 1  # a ray to the right
+    return np.asarray(np.where(inside, -nearest, nearest))
 
 
 def corners_of(obstacle: Obstacle) -> Array:
     """The corners of a polygon, (K, 2)."""
-    return np.array([[float(value) for value in corner] for corner in obstacle.polygon])
-
-
-def edges(corners: Array) -> list[tuple[Array, Array]]:
-    """The edges of a polygon, from corner to corner."""
-    return list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
-
-
-def _to_segment(points: Array, a: Array, b: Array) -> Array:
-    """Distance of points (K, 2) to the segment from a to b."""
-    along = b - a
-    share = np.clip((points - a) @ along / (along @ along), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - a - share[..., None] * along, axis=-1))
-
-
-def _inside(corners: Array, points: Array) -> Array:
-    """Whether points (K, 2) are in a polygon: a ray to the right crosses an odd number of edges."""
-    crossings = np.zeros(points.shape[:-1], dtype=int)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        for a, b in edges(corners):
-            spans = (a[1] > points[..., 1]) != (b[1] > points[..., 1])
-            at = a[0] + (points[..., 1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
-            crossings += spans & (points[..., 0] < at)
-    return np.asarray(crossings % 2 == 1)
+    return np.array(obstacle.polygon, dtype=float)

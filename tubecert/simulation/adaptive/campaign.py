@@ -25,7 +25,7 @@ from tubecert.simulation.adaptive.engine import integrate
 from tubecert.simulation.adaptive.judge import Comparison, check_class, compare, of_plan, of_run, of_tube
 from tubecert.simulation.adaptive.loops import Batch, Cases, Disturbance, Loop, Runs, joined, mapped
 from tubecert.simulation.adaptive.setting import Setting
-from tubecert.simulation.adaptive.uncertainty import acting, adversaries, random_members, usual
+from tubecert.simulation.adaptive.uncertainty import acting, adversaries, random_members
 from tubecert.simulation.told import Clearance
 from tubecert.simulation.vectors import finished, tell, vectors_of
 from tubecert.trajectory import Plan
@@ -223,9 +223,11 @@ def _judged(
 
 
 def _specified(setting: Setting) -> Cases:
-    """Start and h of the specification."""
-    own = usual(setting.uncertainty, Disturbance.from_expressions(setting.h, setting.model, 1))
-    return Cases(setting.started(np.ones((len(setting.x0), 1))), own)
+    """Start and h of the specification, beside a wind, if there is any, that blows outward and does not turn."""
+    genes = np.full((setting.uncertainty.beside, 1), 0.5)
+    genes[1:2] = 0.0
+    h = Disturbance.from_expressions(setting.h, setting.model, 1)
+    return Cases(setting.started(np.ones((len(setting.x0), 1))), acting(setting.uncertainty, h, genes))
 
 
 def _vector(setting: Setting, loops: Sequence[Loop], own: Cases, seed: int, numbers: range) -> list[Runs]:

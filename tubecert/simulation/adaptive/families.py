@@ -52,12 +52,6 @@ class Drawing:
     count: int
     steering: Steering
 
-    @property
-    def draws(self) -> int:
-        """How many draws a plan needs."""
-        n, m = len(self.model.states), len(self.model.inputs)
-        return 1 + 3 * (n + m) + n
-
     def speed(self, t: float | Array, x: Array, u: Array) -> Array:
         """f(t, x) + B(x) u for points (n, N) and (m, N), at one time or at N."""
         return self.drift.run_floats([*x, *u, np.broadcast_to(t, x[0].shape)], x[0].shape)
@@ -71,9 +65,12 @@ def drawing_of(spec: Spec, model: ControlAffineModel, horizon: float) -> Drawing
     drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME))
     P, Q = (np.array(box, dtype=float) for box in (bundle.x, bundle.u))
     P += _INSIDE * np.ptp(P, axis=1)[:, None] * [1, -1]
-    A, B = _linear(drift, P, Q)
-    half = np.maximum(np.ptp(P, axis=1) / 2, _SECANT)
-    pace = np.linalg.norm(A * half / half[:, None], 2)  # 1/s, whatever the units of the states
+    boxes, n = np.vstack([P, Q]), len(P)
+    half = np.maximum(np.ptp(boxes, axis=1) / 2, _SECANT)
+    ends = boxes.mean(axis=1)[:, None] + np.hstack([np.diag(half), -np.diag(half)])
+    high, low = np.split(drift.run_floats([*ends, np.zeros(ends.shape[1])], ends.shape[1:]), 2, axis=1)
+    A, B = np.split((high - low) / (2 * half), [n], axis=1)  # by secants
+    pace = np.linalg.norm(A * half[:n] / half[:n, None], 2)  # 1/s, whatever the units of the states
     count = int(np.clip(ceil(pace * horizon / _PACE), *_KNOTS))
     return Drawing(
         model=model,
@@ -83,16 +80,6 @@ def drawing_of(spec: Spec, model: ControlAffineModel, horizon: float) -> Drawing
         count=count,
         steering=Steering(A, B, horizon / count, P, Q),
     )
-
-
-def _linear(drift: Tape, P: Array, Q: Array) -> tuple[Array, Array]:
-    """A (n, n) and B (n, m) over the boxes, by secants."""
-    boxes = np.vstack([P, Q])
-    half = np.maximum(np.ptp(boxes, axis=1) / 2, _SECANT)
-    ends = boxes.mean(axis=1)[:, None] + np.hstack([np.diag(half), -np.diag(half)])
-    high, low = np.split(drift.run_floats([*ends, np.zeros(ends.shape[1])], ends.shape[1:]), 2, axis=1)
-    slopes = (high - low) / (2 * half)
-    return slopes[:, : len(P)], slopes[:, len(P) :]
 
 
 def members_of(drawing: Drawing, seed: int, numbers: Sequence[int]) -> Iterator[tuple[Plan, float]]:
@@ -112,16 +99,19 @@ def members_of(drawing: Drawing, seed: int, numbers: Sequence[int]) -> Iterator[
                     found[number] = plan, defect
         for number in part:
             if number not in found:
-                raise TubecertError([_none(drawing, number)])
+                message = f"no random plan {number} was found that keeps x* and u* in their boxes"
+                told = f"{message} for {near(drawing.horizon)} s"
+                help = "give a plan of your own with --plan FILE, or a shorter --duration"
+                raise TubecertError([Finding(code="TC708", message=told, help=help)])
             yield found[number]
 
 
 def _drawn(drawing: Drawing, seed: int, numbers: Sequence[int], trial: int) -> Iterator[tuple[int, Knots]]:
     """Those of the plans that keep to the boxes at their knots, which are exact."""
-    seeds = [np.random.SeedSequence(entropy=seed, spawn_key=(2**30, number, trial)) for number in numbers]
-    draws = np.stack([np.random.default_rng(each).random(drawing.draws) for each in seeds], axis=1)
     steer, count, length = drawing.steering, drawing.count, float(drawing.horizon) / drawing.count
     n, m = len(steer.x), len(steer.u)
+    seeds = [np.random.SeedSequence(entropy=seed, spawn_key=(2**30, number, trial)) for number in numbers]
+    draws = np.stack([np.random.default_rng(each).random(1 + 3 * (n + m) + n) for each in seeds], axis=1)
     wide, most = _WIDEST ** (draws[0] * (1 - trial / _TRIES)), _DEFECT * float(drawing.bundle.defect)
     x, u = [steer.inside(draws[-n:], wide)], list[Array]()
     with np.errstate(all="ignore"):  # plans that go astray
@@ -155,12 +145,3 @@ def _belongs(drawing: Drawing, plan: PiecewisePlan) -> float | None:
     low, high = np.array(drawing.bundle.x, dtype=float).T[:, :, None, None]
     inside = bool(((x >= low) & (x <= high)).all())
     return defect if inside and defect <= (float(drawing.bundle.defect) or _ROUNDING * speed) else None
-
-
-def _none(drawing: Drawing, number: int) -> Finding:
-    return Finding(
-        code="TC708",
-        message=f"no random plan {number} was found that keeps x* and u* in their boxes for "
-        f"{near(drawing.horizon)} s",
-        help="give a plan of your own with --plan FILE, or a shorter --duration",
-    )

@@ -18,6 +18,7 @@ from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
 from tubecert.expression import ZERO, Expression, free_symbols, symbol
 from tubecert.model import ControlAffineModel
+from tubecert.simulation.adaptive.loops import of_some, put
 
 FOUND, NOT_POSITIVE, NOT_FOUND, UNRESOLVED = range(4)
 REASONS: Final = {
@@ -116,7 +117,7 @@ class Geodesics:
         if found.status.any():
             left = np.flatnonzero(found.status)
             for some in np.array_split(left, -(-len(left) // _TOGETHER)):
-                _put(found, some, self._newton(_some(p, some), span[:, some], self.a[:, :, some]))
+                put(found, some, self._newton(_some(p, some), span[:, some], self.a[:, :, some]))
         self._before, self.a = [self._before[1], self.a], found.a
         return found
 
@@ -148,7 +149,7 @@ class Geodesics:
                 found = own
                 found.status[~done] = NOT_FOUND
             else:
-                _put(found, lanes[done], own, done)
+                put(found, lanes[done], of_some(own, np.flatnonzero(done)))
             if done.all() or not (left := ~done & (share > 0)).any():
                 break
             lanes, p, span, a = lanes[left], _some(p, left), span[:, left], a[:, :, left]
@@ -201,14 +202,6 @@ def _settled(curve: _Curve, a: Array) -> Geodesic:
     uneven = curve.density.max(axis=0) - curve.density.min(axis=0)
     resolved = (uneven <= _UNEVEN * curve.energy) & (curve.energy < np.inf)
     return Geodesic(np.where(resolved, FOUND, UNRESOLVED), curve.energy, curve.m[:, 0], curve.m[:, -1], a)
-
-
-def _put(
-    found: Geodesic, lanes: NDArray[np.intp], own: Geodesic, of: NDArray[np.bool_] | slice = slice(None)
-) -> None:
-    """Replaces some lanes by those `of` others."""
-    for whole, part in zip(found, own, strict=True):
-        whole[..., lanes] = part[..., of]
 
 
 def _some(p: Array, lanes: NDArray[np.intp] | NDArray[np.bool_]) -> Array:

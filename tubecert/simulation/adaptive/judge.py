@@ -150,44 +150,38 @@ def _went(own: _Judged, promise: Promise | None) -> Iterator[tuple[str, Went]]:
 def _violations(own: _Judged, promise: Promise) -> Iterator[Violation]:
     """Every bound that is broken, by the run that breaks it most."""
     runs, found, spec = own.runs, own.runs.found, own.setting.spec
-    never = np.full(len(own.left), np.nan)  # when an input was at its end is not known
     for name, bound in promise.bounds.items():
-        words, when = "tube" if name == "distance" else name, getattr(found.peak_time, name)
-        yield from _broken(own, words, getattr(found.peak, name), bound, bound, when)
-    rows = [*np.eye(len(spec.states)), *(np.array([*map(float, output.row)]) for output in spec.outputs)]
+        values, when = (getattr(each, name)[:, None] for each in (found.peak, found.peak_time))
+        yield from _broken(own, "tube" if name == "distance" else name, (values, when), bound, bound)
+    rows = [*np.eye(len(spec.states)), *(np.array(output.row, dtype=float) for output in spec.outputs)]
     for name, row in zip((*spec.states, *(output.name for output in spec.outputs)), rows, strict=True):
         width, away = promise.half_widths[name], np.abs(runs.off @ row)
-        yield from _over_time(own, f"half-width of {name}", away, np.full(len(runs.t), width), width)
+        yield from _broken(own, f"half-width of {name}", (away, runs.t), width, width)
     for name, stays in promise.ranges.items():
         column, size = spec.inputs.index(name), stays.greatest - stays.least
         ends = (("", found.greatest, stays.greatest), ("-", -found.least, -stays.least))
-        for sign, values, bound in ends:
-            yield from _broken(own, f"input {sign}{name}", values[column], bound, size, never)
+        for sign, values, bound in ends:  # when it was there is not known
+            yield from _broken(
+                own, f"input {sign}{name}", (values[column][:, None], np.array(np.nan)), bound, size
+            )
     if promise.decay is not None:
-        yield from _over_time(own, "D(t)", runs.distance, promise.decay(runs.t), own.setting.reach)
+        yield from _broken(own, "D(t)", (runs.distance, runs.t), promise.decay(runs.t), own.setting.reach)
     for lane in np.flatnonzero((found.stopped != 0) & own.left).tolist():
         t, value, rho = float(found.ended[lane]), float(found.peak.deviation[lane]), own.setting.rho
         yield Violation(of="tube", run=lane, t=t, value=value, bound=rho, share=value / rho)
 
 
-def _over_time(own: _Judged, name: str, values: Array, allowed: Array, scale: float) -> Iterator[Violation]:
-    """Values (N, K) against a bound (K,) at the output times: each run where it is furthest beyond."""
-    worst = np.argmax(np.nan_to_num(values - allowed, nan=-np.inf), axis=1)
-    lanes = np.arange(len(values))
-    return _broken(own, name, values[lanes, worst], allowed[worst], scale, own.runs.t[worst])
-
-
 def _broken(
-    own: _Judged, name: str, values: Array, bounds: Array | float, scale: float, times: Array
+    own: _Judged, name: str, met: tuple[Array, Array], bounds: Array | float, scale: float
 ) -> Iterator[Violation]:
-    """The run whose value (N,) is furthest beyond its bound and what its error may add, a part of `scale`."""
-    bounds = np.broadcast_to(bounds, values.shape)
-    excess = np.where(own.usable, values - bounds - own.room * scale, -np.inf)
-    lane = int(np.argmax(excess))
-    if excess[lane] > 0:
-        t, value, bound = _finite(times[lane]), float(values[lane]), float(bounds[lane])
-        share = value / bound if bound > 0 else None
-        yield Violation(of=name, run=lane, t=t, value=value, bound=bound, share=share)
+    """Where values (N, K) are furthest beyond bounds (K,) and what the errors may add, parts of `scale`; with times."""
+    values, times, bounds = np.broadcast_arrays(*met, bounds)
+    excess = np.where(own.usable[:, None], values - bounds - (own.room * scale)[:, None], -np.inf)
+    lane, step = np.unravel_index(int(np.argmax(np.nan_to_num(excess, nan=-np.inf))), excess.shape)
+    if excess[lane, step] > 0:
+        value, bound = float(values[lane, step]), float(bounds[lane, step])
+        share, t = value / bound if bound > 0 else None, _finite(times[lane, step])
+        yield Violation(of=name, run=int(lane), t=t, value=value, bound=bound, share=share)
 
 
 def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: str) -> None:
@@ -204,15 +198,17 @@ def check_class(setting: Setting, runs: Runs, h: tuple[Expression, ...], where: 
     with np.errstate(invalid="ignore"):
         h_x = np.linalg.norm(np.nan_to_num(slopes @ np.linalg.inv(setting.S)), ord=2, axis=(2, 3))
         size, h_t = np.linalg.norm(values[:2], axis=1)
-    begun = "|h| at the start", np.where(runs.t == 0, size, 0.0), kind.h_initial, "h"
-    rates = ("|dh/dt|", h_t, kind.h_t, "h_t"), ("|dh/dx|", h_x, kind.h_x, "h_x")
-    for words, found, bound, declared in (("|h|", size, kind.h, "h"), *rates, begun):
-        excess = np.where(inside, np.nan_to_num(found), 0.0)
-        lane, step = np.unravel_index(int(np.argmax(excess)), excess.shape)
-        if excess[lane, step] > bound * (1 + _EXACT):
+    for words, found, bound, declared in (
+        ("|h|", size, kind.h, "h"),
+        ("|dh/dt|", h_t, kind.h_t, "h_t"),
+        ("|dh/dx|", h_x, kind.h_x, "h_x"),
+        ("|h| at the start", np.where(runs.t == 0, size, 0.0), kind.h_initial, "h"),
+    ):
+        lane, step = divmod(int(np.argmax(excess := np.where(inside, np.nan_to_num(found), 0.0))), t.shape[1])
+        if (most := float(excess[lane, step])) > bound * (1 + _EXACT):
             message = (
                 f"the uncertainty leaves the class that was certified: {words} is "
-                f"{near(excess[lane, step])} > {near(bound)} at t = {near(runs.t[step], 4)}"
+                f"{near(most)} > {near(bound)} at t = {near(runs.t[step], 4)}"
             )
             help = f"certify with {declared} declared in uncertainty.bounds"
             place = setting.spec.location(where)

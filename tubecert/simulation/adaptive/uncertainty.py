@@ -111,12 +111,10 @@ def random_members(kind: Class, genes: Array, offset: Array) -> Disturbance:
     )
     amplitude, wave = size[:, None] * _unit(each[:, 4 : 4 + kind.m]), _unit(each[:, 4 + kind.m :])
     wave *= steepness[:, None]
-    base = (wave * offset).sum(axis=1)
-    angle = np.remainder(base + 2 * np.pi * each[:, 3] + np.pi, 2 * np.pi) - np.pi
-    push = np.zeros(genes.shape[1])
-    phase = _begun(kind, amplitude, angle, push) - base
-    still = Disturbance.nothing(kind.n, kind.m, len(push))
-    return still._replace(amplitude=amplitude, frequency=rates, wave=wave, phase=phase, push=push)
+    starts = (wave * offset).sum(axis=1), each[:, 3]
+    still = Disturbance.nothing(kind.n, kind.m, genes.shape[1])
+    waves = still._replace(amplitude=amplitude, frequency=rates, wave=wave)
+    return waves._replace(phase=_phases(kind, waves, starts))
 
 
 def _share(genes: Array) -> Array:
@@ -150,11 +148,9 @@ def adversaries(kind: Class, genes: Array, offset: Array) -> Disturbance:
     steepness = np.where(height > 0, genes[2] * _over(room[1], height), 0.0)
     q = steepness * _unit(genes[4:last])
     amplitude = (c * height)[:, None] * _unit(genes[last : last + kind.m])
-    base = (q * offset).sum(axis=0)
-    angle = np.remainder(base + 2 * np.pi * genes[1] + np.pi, 2 * np.pi) - np.pi
-    phase = _begun(kind, amplitude, j * angle, push) - j * base
     still, wave = Disturbance.nothing(kind.n, kind.m, len(push)), j[:, None] * q
-    return still._replace(amplitude=amplitude, frequency=j * frequency, wave=wave, phase=phase, push=push)
+    own = still._replace(amplitude=amplitude, frequency=j * frequency, wave=wave, push=push)
+    return own._replace(phase=_phases(kind, own, ((q * offset).sum(axis=0), genes[1]), j))
 
 
 def _pushed(kind: Class, share: Array) -> tuple[Array, Array, Array]:
@@ -178,21 +174,27 @@ def _unit(genes: Array) -> Array:
     return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-2, keepdims=True), _TINY))
 
 
-def _begun(kind: Class, amplitude: Array, angle: Array, push: Array) -> Array:
-    """The angles (W, N) of the waves at the start, moved towards zeros as |h(0, x(0))| <= H0 asks for, all alike."""
-    room = np.maximum(0.0, kind.h_initial - push)
+def _phases(
+    kind: Class, own: Disturbance, starts: tuple[Array, Array], harmonics: Array | float = 1.0
+) -> Array:
+    """The phases (W, N) of waves that begin at places, in rad, and in shares of a turn.
+
+    They are moved towards zeros as |h(0, x(0))| <= H0 asks for, all alike.
+    """
+    base, turn = starts
+    angle = harmonics * (np.remainder(base + 2 * np.pi * turn + np.pi, 2 * np.pi) - np.pi)
+    room, N = np.maximum(0.0, kind.h_initial - own.push), len(own.push)
 
     def fits(share: Array) -> Array:
-        h = (np.sin(share * angle)[:, None] * amplitude).sum(axis=0)
+        h = (np.sin(share * angle)[:, None] * own.amplitude).sum(axis=0)
         return np.asarray(np.linalg.norm(h, axis=0) <= room)
 
-    low, high = np.zeros(len(push)), np.ones(len(push))
-    low = np.where(fits(high), 1.0, low)
+    low, high = np.where(fits(np.ones(N)), 1.0, 0.0), np.ones(N)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         good = fits(middle)
         low, high = np.where(good, middle, low), np.where(good, high, middle)
-    return np.asarray(low * angle)
+    return np.asarray(low * angle - harmonics * base)
 
 
 def acting(kind: Class, h: Disturbance, genes: Array) -> Disturbance:
@@ -212,10 +214,3 @@ def acting(kind: Class, h: Disturbance, genes: Array) -> Disturbance:
         gusting=np.stack([turns, 2 * np.pi * np.where(turns > 0, genes[2], 0.25)]),
         theta=low + (high - low) * share,
     )
-
-
-def usual(kind: Class, h: Disturbance) -> Disturbance:
-    """An h that is given for one lane, beside a wind, if there is any, that blows outward and does not turn."""
-    genes = np.full((kind.beside, 1), 0.5)
-    genes[1:2] = 0.0
-    return acting(kind, h, genes)
