@@ -96,13 +96,10 @@ def _contraction(spec: Spec, model: ControlAffineModel, points: Array, W: Array)
         return
     N = np.linalg.svd(B)[0][:, :, m:]
     across = N.transpose(0, 2, 1)
-    with np.errstate(all="ignore"):
-        root = (
-            np.linalg.cholesky(across @ W @ N + 1e-300 * np.eye(n - m)) if _definite(across @ W @ N) else None
-        )
-    if root is None:
+    inner = across @ W @ N
+    if not (np.linalg.eigvalsh(inner)[:, 0] > 0).all():
         return
-    inverse = np.linalg.inv(root)
+    inverse = np.linalg.inv(np.linalg.cholesky(inner + 1e-300 * np.eye(n - m)))
     largest = -np.linalg.eigvalsh(inverse @ (across @ drift @ N) @ inverse.transpose(0, 2, 1))[:, -1] / 2
     k = int(np.argmin(largest))
     rate = float(model.rate)
@@ -120,10 +117,6 @@ def _contraction(spec: Spec, model: ControlAffineModel, points: Array, W: Array)
         )
         help = slower if largest[k] > 0 else wrong
         yield finding(spec, codes.NOT_CONTRACTING, "metric.rate", message, help, severity=Severity.ERROR)
-
-
-def _definite(matrices: Array) -> bool:
-    return bool((np.linalg.eigvalsh(matrices)[:, 0] > 0).all())
 
 
 def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:

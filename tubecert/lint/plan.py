@@ -1,6 +1,7 @@
 """Plan, start and obstacles: are they where they can be, and does the plan satisfy the dynamics?
 
-Knots, equilibria and starts are compared exactly; between knots, and along expressions of t, in floats at samples.
+Knots, equilibria and starts are compared exactly, with obstacles where they are near in floats; between knots, and
+along expressions of t, in floats at samples.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 
@@ -224,25 +226,26 @@ def _listed(values: Iterable[Fraction | float], digits: int) -> str:
 
 
 def _obstacles(spec: Spec, curve: Curve) -> Iterator[Finding]:
+    starts = spec.start_box or tuple((value, value) for value in spec.x0)
     for j, obstacle in enumerate(spec.obstacles):
-        i, k = (spec.states.index(name) for name in obstacle.states)
-        path = f"obstacles[{j}]"
-        if _apart(obstacle, spec.safe_set[i], spec.safe_set[k]):
+        plane = [spec.states.index(name) for name in obstacle.states]
+        path, extents = f"obstacles[{j}]", [_extent(obstacle, axis) for axis in (0, 1)]
+        pairs = zip(extents, (spec.safe_set[i] for i in plane), strict=True)
+        if any(most < low or least > high for (least, most), (low, high) in pairs):
             message = "the obstacle lies outside the safe set"
             help = "a tube in the safe set cannot meet it"
             yield finding(spec, codes.OBSTACLE_OUTSIDE, path, message, help, severity=Severity.NOTE)
-        hit = next((t for t, x in zip(curve.t, curve.x, strict=True) if obstacle.contains(x[i], x[k])), None)
-        if hit is not None:
-            message = f"the plan meets the obstacle at t = {near(hit, 4)} s"
+        least, most = np.array(extents, dtype=float).T
+        slack, x = _ROUNDING * np.maximum(np.abs(least), np.abs(most)), curve.x[:, plane]
+        around = ((least - slack <= x) & (x <= most + slack)).all(axis=1)
+        hits = (k for k in np.flatnonzero(around) if obstacle.contains(*map(Fraction, x[k])))
+        if (hit := next(hits, None)) is not None:
+            message = f"the plan meets the obstacle at t = {near(curve.t[hit], 4)} s"
             help = "plan around it: no tube around this plan keeps away from the obstacle"
             yield finding(spec, codes.COLLISION, path, message, help)
-
-
-def _apart(obstacle: Obstacle, first: tuple[Fraction, Fraction], second: tuple[Fraction, Fraction]) -> bool:
-    """Whether the obstacle's bounding box and the safe set have no point in common (exact)."""
-    extents = (_extent(obstacle, axis) for axis in (0, 1))
-    pairs = zip(extents, (first, second), strict=True)
-    return any(most < low or least > high for (least, most), (low, high) in pairs)
+        elif any(obstacle.contains(*at) for at in product(*(starts[i] for i in plane))):
+            message, help = "the initial state is in the obstacle", "the tube contains it: start elsewhere"
+            yield finding(spec, codes.COLLISION, path, message, help)
 
 
 def _extent(obstacle: Obstacle, axis: int) -> tuple[Fraction, Fraction]:

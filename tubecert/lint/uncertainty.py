@@ -29,11 +29,8 @@ def uncertainty_findings(spec: Spec, time: Range | None, effort: Effort) -> list
     if spec.uncertainty.h is None:
         return list(_declared_zero(spec)) if is_met else []
     if all(term.expression is ZERO for term in spec.uncertainty.h):
-        return (
-            []
-            if not is_met
-            else [_nothing(spec, "uncertainty.h", "h is zero: there is no uncertainty to compensate")]
-        )
+        nothing = _nothing(spec, "uncertainty.h", "h is zero: there is no uncertainty to compensate")
+        return [nothing] if is_met else []
     return list(_bounds(spec, time, replace(effort, gap=0.05, budget=min(effort.budget, _BUDGET))))
 
 
