@@ -10,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from proven import proven
 
+from tubecert.enclosure.branch_and_bound import Supremum
 from tubecert.findings import Severity
-from tubecert.pipeline.membership import membership
+from tubecert.pipeline import membership as membership_of
+from tubecert.pipeline.membership import member_spec, membership
 from tubecert.spec import load_text
 
 FAMILY = """
@@ -85,16 +87,8 @@ def table(tmp_path, rows, **keys):
 def sampled(a, w, count):
     """Knots of p = a sin(w t) and its v, u; the defect between them is small."""
     t = np.linspace(0, 2, count)
-    return [
-        (
-            f"{s:.6f}",
-            *(
-                f"{q:.9f}"
-                for q in (a * np.sin(w * s), a * w * np.cos(w * s), a * (1 - w * w) * np.sin(w * s))
-            ),
-        )
-        for s in t
-    ]
+    rows = np.stack([a * np.sin(w * t), a * w * np.cos(w * t), a * (1 - w * w) * np.sin(w * t)], axis=1)
+    return [(f"{s:.6f}", *(f"{q:.9f}" for q in row)) for s, row in zip(t, rows, strict=True)]
 
 
 @pytest.fixture
@@ -119,6 +113,18 @@ def test_between_knots_a_curve_may_leave_what_its_knots_keep(tmp_path, family):
     done = run("check", "--family", family, table(tmp_path, rows))
     assert done.exit_code == 1
     assert "p* goes 0.04 beyond its range at t = 0.25 s" in done.output
+
+
+def test_a_defect_of_nothing_is_decided_at_once(tmp_path, monkeypatch):
+    """A plan at rest took 19 s to be undecided: of what is not exactly 0, closer bounds tell no more."""
+    gaps, near = [], Supremum(below=0.0, above=1e-14, at={}, boxes=1, reached=True)
+    monkeypatch.setattr(membership_of, "supremum", lambda *own: gaps.append(own[2].gap) or near)
+    family = load_text(FAMILY.replace("-p]", "-sin(p)]").replace("0.05, h", "0, h"))
+    own = member_spec(str(table(tmp_path, [(0, 0, 0, 0), (1, 0, 0, 0)])), family)
+    assert (codes(membership(own, family, "it")), gaps) == (IS, [])
+    own = member_spec(str(table(tmp_path, [(0, 0, 0, 0), (1, 0.1, 0, 0)])), family)
+    assert codes(membership(own, family, "it")) == [("TC412", Severity.ERROR)]
+    assert [gap for gap in gaps if gap > 1e-4] == [0.2]
 
 
 MACHINE = FAMILY[: FAMILY.index("metric:")].replace("0.05, horizon", "5, horizon")
@@ -146,10 +152,8 @@ def test_beside_hardware_inputs_move_as_the_family_says(tmp_path, family, at, ho
     (found,) = membership(load_text(text, str(tmp_path / "own.yaml")), load_text(family), "it")
     assert (words or "is a plan of the family") in found.message
     (tmp_path / "any.yaml").write_text(MACHINE)
-    told = run(
-        "check", "--family", tmp_path / "any.yaml", tmp_path / "plan.csv"
-    ).exit_code  # as a machine holds it
-    assert told == (1 if at[1] == 0.2 else 0)
+    told = run("check", "--family", tmp_path / "any.yaml", tmp_path / "plan.csv")
+    assert told.exit_code == (1 if at[1] == 0.2 else 0)  # as a machine holds it
 
 
 @pytest.mark.parametrize(("u", "belongs"), [("0", True), ("pi/100", True), ("0.01*t", False)])
@@ -179,9 +183,8 @@ def test_a_plan_that_goes_on_after_its_horizon_is_proven_no_further(after, belon
 def test_the_last_input_of_a_held_plan_is_not_reached(tmp_path, family):
     table(tmp_path, [(0, 0.5, 0, 0.5), (1, 0.5, 0, 0.5), (2, 0.5, 0, 9)])
     plan = tmp_path / "held.yaml"
-    own = FAMILY.replace(OWN, "{kind: csv, file: plan.csv, interpolation: HOW}").replace(
-        "initial_state: {within: 0.1}\n", ""
-    )
+    own = FAMILY.replace(OWN, "{kind: csv, file: plan.csv, interpolation: HOW}")
+    own = own.replace("initial_state: {within: 0.1}\n", "")
     plan.write_text(own.replace("HOW", "hold"))
     assert run("check", "--family", family, plan).exit_code == 0
     plan.write_text(own.replace("HOW", "linear"))

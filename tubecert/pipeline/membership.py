@@ -18,7 +18,7 @@ from tubecert.enclosure.branch_and_bound import Effort, Supremum, supremum
 from tubecert.enclosure.objective import SumOfNorms
 from tubecert.enclosure.pencil import scalar
 from tubecert.errors import SpecError
-from tubecert.expression import ZERO, Expression, derivatives, free_symbols
+from tubecert.expression import ZERO, Expression, constant, derivatives, free_symbols
 from tubecert.findings import Finding, Severity
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.printable import visible
@@ -42,17 +42,12 @@ class _Part:
 
     def finding(self, name: str) -> Finding:
         """That it is not kept, or could not be decided."""
-        if self.kept is False:
-            help = "make the boxes or the defect of the family larger and certify again, or plan within them"
-            return Finding(
-                code=NO_MEMBER, message=f"{name} is no plan of the family: {self.words}", help=help
-            )
-        help = "a box or a defect that is larger by a hair decides it"
-        return Finding(
-            code=UNDECIDED,
-            message=f"could not decide whether {name} is of the family: {self.words}",
-            help=help,
-        )
+        code, said = NO_MEMBER, f"{name} is no plan of the family"
+        help = "make the boxes or the defect of the family larger and certify again, or plan within them"
+        if self.kept is None:
+            code, said = UNDECIDED, f"could not decide whether {name} is of the family"
+            help = "a box or a defect that is larger by a hair decides it"
+        return Finding(code=code, message=f"{said}: {self.words}", help=help)
 
 
 def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None) -> list[Finding]:
@@ -65,13 +60,16 @@ def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None
     if bundle is None or spec.trajectory.task is not None or spec.trajectory.bundle is not None:
         raise ValueError("a plan is compared with a family of plans")
     model = build(replace(family, metric=None, synthesis=None))
-    plan = plan_of(spec, model)
+    plan, effort = plan_of(spec, model), effort or Effort()
     if not plan.defined:
         part = _Part(kept=None, words="f or B is not defined at one of its knots")
         return [part.finding(name)]
-    parts = [*_horizon(plan, spec, family), *_boxes(plan, family, bundle, effort or Effort())]
-    parts += _held(plan, family, bundle, effort or Effort())
-    parts.append(_defect(plan, model, bundle.defect, effort or Effort()))
+    if (knots := plan.knots) and len({*zip(knots.x, knots.u, strict=True)}) == 1:
+        point = Plan(tuple(map(constant, knots.x[0])), tuple(map(constant, knots.u[0])), plan.horizon)
+        plan = plan if any(row[0] is not ZERO for row in point.defect(model)) else point  # exactly at rest
+    parts = [*_horizon(plan, spec, family), *_boxes(plan, family, bundle, effort)]
+    parts += _held(plan, family, bundle, effort)
+    parts.append(_defect(plan, model, bundle.defect, effort))
     missed = [part.finding(name) for part in parts if not part.kept]
     if missed:
         return missed
@@ -166,8 +164,8 @@ def _defect(plan: Plan, model: ControlAffineModel, limit: Fraction, effort: Effo
         return _Part(kept=True, words="it satisfies the dynamics exactly")
     objective = SumOfNorms([p], plan.fixed)
     domain = Defect.of(plan, model, 0.0, effort).domain
-    for gap in _GAPS:
-        found = supremum(objective, domain, replace(effort, gap=gap, absolute=gap * float(limit)))
+    for gap in _GAPS if limit else _GAPS[:1]:  # of what is not exactly 0 closer bounds tell no more
+        found = supremum(objective, domain, replace(effort, gap=gap, absolute=gap * float(limit) or _FINE))
         kept = _kept(found, limit)
         if kept is not None:
             break
