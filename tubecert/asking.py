@@ -12,7 +12,7 @@ import importlib.util
 import inspect
 import numbers
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import KW_ONLY, dataclass, field, replace
@@ -154,9 +154,7 @@ class Text(Kind):
 
     def read(self, name: str, value: Any) -> str | list[str]:
         """The text; several as a list."""
-        if self.many:
-            return [text_of(name, each) for each in value]
-        return text_of(name, value)
+        return [text_of(name, each) for each in value] if self.many else text_of(name, value)
 
 
 @dataclass(frozen=True)
@@ -380,13 +378,7 @@ def refuse(name: str, text: str, message: str, help: str = "") -> NoReturn:
 
 
 def _finding(
-    name: str,
-    text: str,
-    message: str,
-    help: str = "",
-    *,
-    code: str = "TC112",
-    at: tuple[int, int] | None = None,
+    name: str, text: str, message: str, help: str = "", *, code: str = "TC112", at: Sequence[int] = ()
 ) -> Finding:
     offset, width = at or (0, len(text))
     place = NamedPlace(file=name, line=1, column=offset + 1, source=text, width=width)

@@ -112,6 +112,11 @@ def _name(mode: int) -> str:
     return "a socket" if stat.S_ISSOCK(mode) else "a device"
 
 
+def stem_of(certificate: str) -> str:
+    """`plant` for `plant.certificate.json`: what is made of a certificate is called after it."""
+    return certificate.removesuffix(".json").removesuffix(".certificate")
+
+
 def replace(path: Path, data: bytes) -> None:
     """Write to a temporary name beside it and rename: an interruption leaves the old file or the new one.
 

@@ -13,10 +13,10 @@ from tubecert.asking import SETTINGS, SPEC, Text, words_of
 from tubecert.cli import keeper, telling
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.report import check_pages
-from tubecert.cli.telling import plan_of, refused, spare, stem_of
+from tubecert.cli.telling import plan_of, refused, spare
 from tubecert.digits import exact
 from tubecert.errors import ExitCode, TubecertError
-from tubecert.files import read
+from tubecert.files import read, stem_of
 from tubecert.library import certifying
 from tubecert.library.pages import Report
 from tubecert.library.specification import Specification

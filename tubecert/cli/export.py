@@ -7,7 +7,7 @@ from dataclasses import replace
 from tubecert.asking import CERTIFICATE, Text
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.telling import stem_of
+from tubecert.files import stem_of
 from tubecert.printable import visible
 
 _WORDS = {

@@ -11,8 +11,8 @@ from tubecert.asking import CERTIFICATE, Text, words_of
 from tubecert.certificate.file import check_target, same_file
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.telling import refused, stem_of
-from tubecert.files import STDIN
+from tubecert.cli.telling import refused
+from tubecert.files import STDIN, stem_of
 from tubecert.library import pages
 from tubecert.library.reading import read
 from tubecert.printable import printable_json, visible

@@ -180,11 +180,6 @@ def spare(target: str, inputs: Mapping[str, str | Path | None]) -> None:
             raise refused(f"{target} is the {what} itself and would be overwritten")
 
 
-def stem_of(certificate: str) -> str:
-    """`plant` for `plant.certificate.json`: what is made of a certificate is called after it, and stands beside it."""
-    return certificate.removesuffix(".json").removesuffix(".certificate")
-
-
 def plan_of(file: str, system: Spec) -> Path | None:
     """The plan file of the specification in `file`, if it has one."""
     table = system.trajectory.table

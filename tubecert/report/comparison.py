@@ -16,6 +16,7 @@ from typing import Final
 from tubecert.certificate.effective import Tree
 from tubecert.claims.conditions import SECTIONS
 from tubecert.digits import UNKNOWN, down, exact, percent, up
+from tubecert.files import stem_of
 from tubecert.records import exact_json
 from tubecert.report.claimed import NOT_RECHECKED, size
 from tubecert.report.gains import gains_text
@@ -211,7 +212,7 @@ def _differing(comparison: Comparison) -> Table:
 
 def _names(paths: Sequence[str]) -> list[str]:
     """A short name for each file: its own, with its folders where two are called the same."""
-    whole = [path.removesuffix(".json").removesuffix(".certificate") or path for path in paths]
+    whole = [stem_of(path) or path for path in paths]
     own = [PurePath(path).name or path for path in whole]
     names = [path if own.count(name) > 1 else name for path, name in zip(whole, own, strict=True)]
     return [f"{name} ({i})" if names.count(name) > 1 else name for i, name in enumerate(names, 1)]

@@ -79,7 +79,8 @@ def _fewer(blocks: Sequence[Block]) -> Sequence[Block] | None:
         names = [] if not isinstance(block, Facts) else [name for name, _ in block.facts]
         if isinstance(block, Facts) and (spare := next((n for n in block.spare if n in names), None)):
             last = len(names) - 1 - names[::-1].index(spare)
-            return [*blocks[:i], replace(block, facts=_without(block.facts, last)), *blocks[i + 1 :]]
+            left = (*block.facts[:last], *block.facts[last + 1 :])
+            return [*blocks[:i], replace(block, facts=left), *blocks[i + 1 :]]
     tables = [(len(block.rows), i) for i, block in enumerate(blocks) if isinstance(block, Table)]
     longest, i = max(tables, default=(0, 0))
     table = blocks[i] if longest > _FEWEST else None
@@ -87,10 +88,6 @@ def _fewer(blocks: Sequence[Block]) -> Sequence[Block] | None:
         return None
     rows = table.rows[: min(longest - 1, _MOST)]
     return [*blocks[:i], replace(table, rows=rows, left=table.left + longest - len(rows)), *blocks[i + 1 :]]
-
-
-def _without(facts: tuple[tuple[str, Cell], ...], index: int) -> tuple[tuple[str, Cell], ...]:
-    return facts[:index] + facts[index + 1 :]
 
 
 def _opening(page: Page, blocks: Sequence[Block]) -> Iterator[RenderableType]:
