@@ -67,22 +67,12 @@ def test_version_of_what_results_rest_on():
     assert json.loads(run("--json", "version").stdout)["tubecert"] == __version__
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["certfy"],
-        ["certify"],
-        ["certify", SPEC, "--rho"],
-        ["certify", SPEC, "--rho-a"],
-        ["certify", SPEC, "--conditions", "27"],
-        ["certify", SPEC, "--bandwidth", "5"],
-        ["certify", SPEC, "--adaptation-rate", "5"],
-        ["certify", SPEC, "-q", "-v"],
-        ["-q", "certify", SPEC, "-v"],
-        ["check"],
-        ["--color", "sometimes", "version"],
-    ],
-)
+@pytest.mark.parametrize("arguments", [
+    ["certfy"], ["certify"], ["certify", SPEC, "--rho"], ["certify", SPEC, "--rho-a"],
+    ["certify", SPEC, "--conditions", "27"], ["certify", SPEC, "--bandwidth", "5"],
+    ["certify", SPEC, "--adaptation-rate", "5"], ["certify", SPEC, "-q", "-v"], ["-q", "certify", SPEC, "-v"],
+    ["check"], ["--color", "sometimes", "version"],
+])  # fmt: skip
 def test_usage_errors(arguments, folder):
     quiet_failure(run(*arguments), 2)
     assert not list(folder.iterdir())
@@ -105,15 +95,10 @@ def test_a_certificate_is_written_and_reported(folder, proven):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("result", "code"),
-    [
-        (certificates.certified(), 0),
-        (certificates.refuted_metric(), 1),
-        (certificates.refuted_gains(), 1),
-        (certificates.undecided(), 4),
-    ],
-)
+@pytest.mark.parametrize(("result", "code"), [
+    (certificates.certified(), 0), (certificates.refuted_metric(), 1), (certificates.refuted_gains(), 1),
+    (certificates.undecided(), 4),
+])  # fmt: skip
 @pytest.mark.parametrize("how", [(), ("-q",), ("-v",), ("--json",)])
 def test_every_verdict_has_its_code_and_its_certificate(folder, proven, result, code, how):
     proven["result"] = result
@@ -276,14 +261,11 @@ def test_bad_metric_files(folder, unused, content, said):
     assert result.stderr.endswith("1 error\n")
 
 
-@pytest.mark.parametrize(
-    ("change", "claim"),
-    [
-        ({"rate": 5}, "metric, contraction"),
-        ({"dual_metric": [["1", "0", "x3"], ["0", "1", "0"], ["x3", "0", "2"]]}, "metric, inputs"),
-        ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["0", "0", "-1"]]}, "metric, definiteness"),
-    ],
-)
+@pytest.mark.parametrize(("change", "claim"), [
+    ({"rate": 5}, "metric, contraction"),
+    ({"dual_metric": [["1", "0", "x3"], ["0", "1", "0"], ["x3", "0", "2"]]}, "metric, inputs"),
+    ({"dual_metric": [["1", "0", "0"], ["0", "1", "0"], ["0", "0", "-1"]]}, "metric, definiteness"),
+])  # fmt: skip
 def test_a_metric_file_is_verified(folder, change, claim):
     (folder / "w.json").write_text(json.dumps(METRIC | change))
     result = run("certify", SPEC, "--metric", "w.json")
@@ -341,11 +323,8 @@ def test_a_disk_that_fills_up_leaves_no_part(folder, proven, monkeypatch):
 
 @pytest.mark.parametrize("gain", ["1e-300", "1e300", "1e60"])
 def test_gains_that_nothing_can_have_are_refused(unused, gain):
-    for options in (
-        ["--bandwidth", gain, "--adaptation-rate", "1"],
-        ["--bandwidth", 1, "--adaptation-rate", gain],
-    ):
-        result = run("certify", SPEC, *options)
+    for omega, rate in ((gain, "1"), ("1", gain)):
+        result = run("certify", SPEC, "--bandwidth", omega, "--adaptation-rate", rate)
         quiet_failure(result, 2)
         assert f"{gain} is not a gain that anything can have" in result.stderr
         assert "write a number between 1e-60 and 1e60" in result.stderr
@@ -417,9 +396,7 @@ def test_a_real_refusal(folder):
     assert result.exit_code == 1
     assert result.stdout.startswith("refuted three_state: metric, contraction: C2 ")
     assert "the largest rate that this metric supports is 0.9999" in " ".join(result.stdout.split())
-    reason = json.loads((folder / "fast.certificate.json").read_text(encoding="utf-8"))["result"]["reasons"][
-        0
-    ]
+    [reason] = json.loads((folder / "fast.certificate.json").read_text("utf-8"))["result"]["reasons"]
     assert reason["verdict"] == "refuted"
     assert len(reason["at"]["x"]) == 3
 

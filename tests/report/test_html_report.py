@@ -264,9 +264,8 @@ def test_what_is_not_certified_has_no_numbers_to_rely_on_and_shows_its_witness(o
     witnesses = [x for d in parsed_page.drawings for x in d.iter("circle") if "witness" in x.get("class")]
     assert len(witnesses) == 3, "one per plane"
     assert "not proven to stay in the safe set" in parsed_page.text
-    assert "certified" not in re.sub(
-        "Not certified|is certified|tubecert certif", "", parsed_page.text.split("Metric")[0]
-    )
+    words = parsed_page.text.split("Metric")[0]
+    assert "certified" not in re.sub("Not certified|is certified|tubecert certif", "", words)
 
 
 def test_undecided_is_never_shown_as_another_verdict():
@@ -357,11 +356,8 @@ def test_every_state_over_time_has_its_half_width(orbit):
 
 def test_an_obstacle_lies_where_it_is_whatever_the_order_of_its_states(orbit):
     drawing = drawn(orbit, "tube-0-1")
-    disc, safe, (unit, _) = (
-        marked(drawing, "obstacle"),
-        marked(drawing, "safe"),
-        units(drawing, orbit, ("x1", "x2")),
-    )
+    disc, safe = marked(drawing, "obstacle"), marked(drawing, "safe")
+    unit, _ = units(drawing, orbit, ("x1", "x2"))
     low, _ = orbit["result"]["safe_set"]["x1"]
     assert disc[:, 0].mean() == pytest.approx(safe[:, 0].min() + (3 - low) * unit, abs=0.02)
     assert np.ptp(disc[:, 0]) == pytest.approx(unit, abs=0.04)

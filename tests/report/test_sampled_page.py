@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from tubecert.report import html, markdown, notebook
 from tubecert.report import pages as explained
+from tubecert.report.claimed import ends
 from tubecert.report.sampled_loop import page_of
 from tubecert.report.terminal import Terminal
 from tubecert.report.text import screen
@@ -31,6 +32,7 @@ from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import NOTHING, SHARES, filling, percents, remedy, why
 
 TEXTS = {"cart": sampled.SPEC, "family": sampled.FAMILY, "drone": sampled.DRONE}
+LONG = re.sub(r"\bp\b", "position", sampled.SPEC)
 OF_CART = sampled.certificate().result.spec.effective
 CLOSING = [("certificate", "cart.certificate.json"), ("next", "a"), ("", "b"), ("", "c")]
 LACKS = {
@@ -85,6 +87,10 @@ def test_what_is_lacking_is_told_with_what_helps_and_never_as_proven(lack):
     ("cart", False, "the plan for all t >= 0"),
     ("family", False, "every plan of the family"),
     ("family", False, "p* in [-0.2, 0.2], v* in [0, 0], F* in [-1, 1]; |F*'| <= 2"),
+    ("long", False, "\n  tube           from 0 s"),  # all values begin in one column
+    ("long", False, "\n  position (m)   0.1321"),
+    ("long", False, "\n  fills position wind 59 %"),
+    ("long", False, "\n  certificate    cart.certificate"),
     ("open", False, "not proven to keep away from number 1"),
     ("cart", True, "Half-widths, and what fills them"),
     ("cart", True, "F (N)       3.1       1.2"),
@@ -93,7 +99,7 @@ def test_what_is_lacking_is_told_with_what_helps_and_never_as_proven(lack):
     ("cart", True, "before the first command acts, the actuators hold"),
 ])  # fmt: skip
 def test_the_screen_says_what_is_proven(name, verbose, told):
-    certificate = sampled.certificate(TEXTS.get(name, sampled.SPEC))
+    certificate = sampled.certificate({**TEXTS, "long": LONG}.get(name, sampled.SPEC))
     if name == "open":
         certificate = sampled.certificate(clearance=(Cleared(index=0, verdict=Verdict.UNDECIDED),))
     assert told in shown(certificate, verbose=verbose)
@@ -164,10 +170,16 @@ def test_where_nothing_acts_it_is_said_in_one_way():
     assert "F           0 to 0.5, within 1e-12 N\n" in text
 
 
+def test_ends_are_rounded_outward_and_not_beyond_the_limits():
+    """100.1 was said of an input that keeps to 100.01."""
+    range_ = Fraction("99.9912"), Fraction("100.0062")
+    assert ends(*range_, (Fraction(0), Fraction("100.01"))) == "99.991 to 100.01"
+    assert ends(*range_, (Fraction(0), Fraction(100))) == ends(*range_) == "99.99 to 100.1"
+
+
 def test_degrees_are_shown_as_degrees():
-    own = sampled.SPEC.replace("p: m, v: m/s", "p: rad, v: rad/s").replace(
-        "{at: [0.1, 0]}", "{box: {p: [-5 deg, 5 deg]}}"
-    )
+    own = sampled.SPEC.replace("{at: [0.1, 0]}", "{box: {p: [-5 deg, 5 deg]}}")
+    own = own.replace("p: m, v: m/s", "p: rad, v: rad/s")
     own = own.replace("{p: 0.001, v: 0.002}", "{p: 0.1 deg, v: 2 deg}").replace("{p: 0.15}", "{p: 10 deg}")
     text = shown(sampled.certificate(own))
     assert "noise p 0.1 deg, v 2 deg/s" in text
@@ -191,10 +203,8 @@ def test_wind_of_a_bounded_rate_is_told_as_that():
     """It is compensated as h is: its share was told to be that of h, and nothing said that its rate is assumed."""
     slow = replace(sampled.NARROW, uncertainty=0.02, wind=0.0)
     filled = {"long_run": {"p": slow, "v": slow}}
-    for rate, cause, within in (
-        ("", "h", "wind is"),
-        (", rate: 0.1", "h and slow wind", "wind and its rate are"),
-    ):
+    told = ("", "h", "wind is"), (", rate: 0.1", "h and slow wind", "wind and its rate are")
+    for rate, cause, within in told:
         own = sampled.certificate(sampled.SPEC.replace("bound: 0.05", f"bound: 0.05{rate}"))
         text = shown(replace(own, notes=replace(own.notes, **filled)), verbose=True)
         assert f"fills p     {cause} 59 %," in text
@@ -247,9 +257,8 @@ def test_the_page_is_the_same_before_and_after_the_certificate_is_written(text):
 
 
 def test_how_far_from_its_plan_is_drawn_where_the_plan_moves():
-    still, family = (
-        figures_of(page_of(sampled.certificate(text))) for text in (sampled.SPEC, sampled.FAMILY)
-    )
+    texts = sampled.SPEC, sampled.FAMILY
+    still, family = (figures_of(page_of(sampled.certificate(text))) for text in texts)
     assert {"deviation-0", "deviation-1", "shares"} == set(family)
     assert not [key for key in still if key.startswith("deviation")]
     assert [words for _, words in family["deviation-0"].legend] == ["wish", "proven in the loop", "plan"]

@@ -87,9 +87,13 @@ def size(bound: Fraction) -> str:
     return f"< {short(NOTHING)}" if 0 < bound < NOTHING else up(bound)
 
 
-def ends(low: Fraction | float, high: Fraction | float) -> str:
-    """Ends of a range, rounded outward; where nothing but rounding is added, as they are."""
-    outward, plain = (down(low), up(high)), [short(round(Fraction(q), 12)) for q in [low, high]]
+def ends(low: Fraction | float, high: Fraction | float, limits: Sequence[Fraction] | None = None) -> str:
+    """Ends of a range, rounded outward, but not beyond limits that it keeps to; where rounding is all, as they are."""
+    rounded = [(down(low, digits), up(high, digits)) for digits in range(4, 18)]
+    least, most = limits or (1, 0)  # which nothing keeps to
+    within = ((a, b) for a, b in rounded if least <= Fraction(a) and Fraction(b) <= most)
+    outward = next(within, rounded[0])
+    plain = [short(round(Fraction(q), 12)) for q in [low, high]]
     missed = max(abs(float(Fraction(plain[0]) - low)), abs(float(Fraction(plain[1]) - high)))
     if missed == 0 or missed > NOTHING:
         return " to ".join(outward)

@@ -10,7 +10,6 @@ from fractions import Fraction
 from itertools import islice
 from typing import Final
 
-from tubecert.certificate.effective import Effective
 from tubecert.digits import near, up
 from tubecert.report.claimed import NOT_RECHECKED, ends, labelled, size, started
 from tubecert.report.figures_sampled import figures, period
@@ -67,9 +66,10 @@ def _sections(
     yield "tube", "Half-widths, and what fills them", widths
     yield "simulation", "Simulation", simulated_blocks(simulated)
     yield "assumed", "Assumed, not proven", [Items(items=tuple(assumed(result)))]
-    yield "system", "The specification", [*system(own, result.spec.settings), *_law(own)]
+    law, exported = ([], []) if is_alone(own) else ([Listing(text="\n".join(_LAW))], [" --controller FOLDER"])
+    yield "system", "The specification", [*system(own, result.spec.settings), *law]
     yield "origin", "Where it comes from", [_origin(certificate)]
-    yield "check", "Check it again", _again(own)
+    yield "check", "Check it again", check_again(_NOTES, *exported)
 
 
 def _meaning(result: Result) -> str:
@@ -139,7 +139,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
 def _inputs(result: Result) -> Iterator[tuple[str, str]]:
     units = result.spec.effective.system.units
     for use in result.inputs:
-        told = f"{ends(*use.range)} {units.get(use.input, '')}".rstrip()
+        told = f"{ends(*use.range, use.limits)} {units.get(use.input, '')}".rstrip()
         if use.limits is not None and use.share is not None:
             limits, used = " to ".join(map(near, use.limits)), up(100 * use.share, 3)
             told += f" of {limits}: {used} % of the way to a limit"
@@ -176,16 +176,6 @@ def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
         if lack.where in notes.filled:
             yield f"fills {lack.where}", filling(notes.filled[lack.where], causes(own))
     yield from (("help", help) for help in dict.fromkeys(remedy(lack, own, notes) for lack in result.lacks))
-
-
-def _law(own: Effective) -> Iterator[Listing]:
-    """What the computer does, if there is a controller."""
-    if not is_alone(own):
-        yield Listing(text="\n".join(_LAW))
-
-
-def _again(own: Effective) -> Iterator[Block]:
-    return check_again(_NOTES, *([] if is_alone(own) else [" --controller FOLDER"]))
 
 
 def _origin(certificate: Certificate) -> Facts:

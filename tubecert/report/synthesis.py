@@ -45,19 +45,13 @@ _CAUSES = {
 
 def page_of(data: SearchData, file: MetricFile | None, name: str, states: Sequence[str] = ()) -> Page:
     """The page of a search in a system of this name; `file` is the metric, None if there is none."""
-    sections = [
-        Section(key=key, title=title, blocks=blocks)
-        for key, title, made in (
-            ("metric", "Metric", _first(data, file, states)),
-            ("tried", "Tried", _tried(data.attempts)),
-        )
-        if (blocks := tuple(made)) or key == "metric"
-    ]
+    first = Section(key="metric", title="Metric", blocks=tuple(_first(data, file, states)))
+    tried = Section.each([("tried", "Tried", _tried(data.attempts))])
     return Page(
         name=name,
         verdict=data.verdict if file is None else "metric proven",
         summary=_numbers(file) if file is not None else data.reason.message if data.reason else "",
-        sections=tuple(sections),
+        sections=(first, *tried),
         about="synthesis",
     )
 

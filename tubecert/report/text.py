@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _MOST: Final = 15  # lines of a first screen
 _FEWEST: Final = 2  # rows of a table that is cut
 _LABELS: Final = 12  # characters of the names before values
+_WIDEST: Final = 24  # of them, where they are no texts
 _FEW, _MANY = 5, 8  # columns of a table whose heads have room, and of one that has little
 _COLORS: Final[Mapping[str, str]] = {
     Verdict.CERTIFIED: "green",
@@ -66,9 +67,10 @@ class _First:
         while blocks is not None:
             shown = Group(*_opening(self.page, blocks))
             lines = len(console.render_lines(shown, options, pad=False))
+            width = _labels(blocks)
             blocks = _fewer(blocks) if lines + len(self.closing) > _MOST else None
         yield shown
-        yield from _closing(self.closing)
+        yield from _closing(self.closing, width)
 
 
 def _fewer(blocks: Sequence[Block]) -> Sequence[Block] | None:
@@ -97,9 +99,9 @@ def _opening(page: Page, blocks: Sequence[Block]) -> Iterator[RenderableType]:
     yield from map(_indented, _shown(blocks))
 
 
-def _closing(rows: Rows) -> Iterator[Text]:
+def _closing(rows: Rows, width: int = _LABELS) -> Iterator[Text]:
     for what, where in rows:
-        label = (f"  {what:<{_LABELS}}", "bold")
+        label = (f"  {what:<{width}}", "bold")
         yield Text.assemble(label, where, no_wrap=True, overflow="ignore")
 
 
@@ -118,6 +120,7 @@ def _indented(item: RenderableType) -> Padding:
 
 def _shown(blocks: Sequence[Block]) -> Iterator[RenderableType]:
     """Blocks as far as a terminal has them: no figures."""
+    width = _labels(blocks)
     for block in blocks:
         match block:
             case Words():
@@ -126,27 +129,34 @@ def _shown(blocks: Sequence[Block]) -> Iterator[RenderableType]:
                 yield from (_text(block.title),) if block.title else ()
                 yield from (_text(f"- {item}") for item in block.items)
             case Facts():
-                yield _facts([(name, _cell(cell)) for name, cell in block.facts])
+                yield _facts([(name, _cell(cell)) for name, cell in block.facts], width)
             case Listing():
                 yield _text(block.text)
             case Reason():
                 yield _reason(block)
             case Table():
-                yield _table(block)
+                yield _table(block, width)
                 notes = (block.note, f"{block.left} more with -v" if block.left else "")
                 yield from (_text(note, "dim") for note in notes if note)
 
 
-def _facts(rows: Sequence[tuple[str, RenderableType]]) -> Grid:
+def _labels(blocks: Sequence[Block]) -> int:
+    """How wide names before values are where facts and tables stand together: their values begin in one column."""
+    facts = [len(name) + 1 for block in blocks if isinstance(block, Facts) for name, _ in block.facts]
+    rows = [len(row[0].text) + 2 for block in blocks if isinstance(block, Table) for row in block.rows]
+    return max([_LABELS, *facts, *rows]) if facts and max(rows, default=0) <= _WIDEST else _LABELS
+
+
+def _facts(rows: Sequence[tuple[str, RenderableType]], width: int = _LABELS) -> Grid:
     grid = Grid.grid()
-    grid.add_column(min_width=_LABELS, no_wrap=True, style="bold")
+    grid.add_column(min_width=width, no_wrap=True, style="bold")
     grid.add_column(style="not bold", overflow="fold")
     for name, told in rows:
         grid.add_row(_text(f"{name} "), told)
     return grid
 
 
-def _table(block: Table) -> Grid:
+def _table(block: Table, labels: int) -> Grid:
     """A table without lines: numbers stay whole, long texts are wrapped; of many columns heads as well."""
     from textwrap import wrap
 
@@ -163,7 +173,7 @@ def _table(block: Table) -> Grid:
         if many > _FEW:
             words = "\n".join(wrap(words, max(width, 1), break_long_words=False))
         grid.add_column(words, justify=justify, overflow="fold", no_wrap=number or width <= _LABELS)
-        grid.columns[i].min_width = None if i or number else _LABELS - 2
+        grid.columns[i].min_width = None if i or number else labels - gap
     for row in block.rows:
         grid.add_row(*map(_cell, row))
     return grid

@@ -52,9 +52,8 @@ def _supports(found: Verified) -> str:
         return ""
     if not isfinite(rate.below):
         return "" if rate.above < 0 else "C2 is void: there are as many inputs as states"
-    return (
-        f"supports rates up to {down(rate.below, 7)} 1/s" if rate.below > 0 else "supports no positive rate"
-    )
+    least = f"rates up to {down(rate.below, 7)} 1/s" if rate.below > 0 else "no positive rate"
+    return f"supports {least}"
 
 
 def _condition(found: Verified) -> str:
@@ -63,8 +62,7 @@ def _condition(found: Verified) -> str:
 
 def as_json(found: Sequence[tuple[str, Verified]]) -> str:
     """A list of objects, one for each metric; what was not reached is left out."""
-    told = [_data(*each) for each in found]
-    return json_text(told)
+    return json_text([_data(*each) for each in found])
 
 
 def _data(file: str, found: Verified) -> Json:
