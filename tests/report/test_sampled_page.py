@@ -32,6 +32,7 @@ from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import NOTHING, SHARES, filling, percents, remedy, why
 
 TEXTS = {"cart": sampled.SPEC, "family": sampled.FAMILY, "drone": sampled.DRONE}
+KEYS = "box", "hold", "slow wind", "h and slow wind", "hardware.rate", "hardware.delay", "hardware.noise"
 LONG = re.sub(r"\bp\b", "position", sampled.SPEC)
 OF_CART = sampled.certificate().result.spec.effective
 CLOSING = [("certificate", "cart.certificate.json"), ("next", "a"), ("", "b"), ("", "c")]
@@ -111,7 +112,7 @@ def test_explain_knows_every_label(name):
     labels = {match[1] for line in lines if (match := re.match(r"  ([a-z]+)(?: [a-z])?  ", line))}
     assert {"loop", "start", "tube", "obstacles"} <= labels
     causes = {cause.rsplit(" ", 2)[0] for cause in filling(sampled.WIDE, SHARES).split(", ")}
-    assert not [word for word in {*labels, *causes, "wish", "room"} if explained.find(word) is None]
+    assert not [word for word in {*labels, *causes, "wish", "room", *KEYS} if explained.find(word) is None]
 
 
 def test_where_parameters_are_not_known_that_is_a_remedy():
