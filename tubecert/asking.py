@@ -282,7 +282,11 @@ def question(words: Words, *pairs: tuple[str, str]) -> Callable[[Callable[P, R]]
 
         @functools.wraps(function)
         def ask(*values: P.args, **options: P.kwargs) -> R:
-            bound = signature.bind(*values, **options)
+            try:
+                bound = signature.bind(*values, **options)
+            except TypeError as error:
+                known = ", ".join(signature.parameters)
+                raise TypeError(f"{function.__name__}() {error}; it takes {known}") from None
             bound.apply_defaults()
             bound.arguments |= read(kinds, bound.arguments, pairs)
             with asked_by(words=kinds, given=bound.arguments):
@@ -313,10 +317,9 @@ def read(
     found: dict[str, object] = {}
     findings: list[Finding] = []
     for name, kind in words.items():
-        if given.get(name) is None:
-            continue
         try:
-            found[name] = kind.read(named(name), given[name])
+            if given.get(name) is not None:
+                found[name] = kind.read(named(name), given[name])
         except SpecError as error:
             findings += error.findings
     for pair in pairs:

@@ -46,6 +46,8 @@ def test_what_goes_together_is_told_to_lack_its_half():
     assert asked(gap="auto", runs=0) == ("auto", 0)
     with pytest.raises(AssertionError):
         exact("auto")
+    with pytest.raises(TypeError, match=r"asked\(\) got .* argument 'gaps'; it takes gap, runs"):
+        asked(gaps=1)
 
 
 def test_words_are_known_and_names_are_lists():

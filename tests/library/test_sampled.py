@@ -41,6 +41,18 @@ def test_the_tube_as_arrays(cart):
     assert certification_of(sampled.certificate(sampled.FAMILY)).tube is None
 
 
+@pytest.mark.slow
+def test_the_tube_is_drawn_as_that_of_other_certificates(cart):
+    from matplotlib.figure import Figure
+
+    axes = cart.plot_tube(Figure().subplots(), states=("v", "p"))
+    assert axes.get_xlabel() == "v (m/s)"
+    assert {"safe set", "tube", "obstacle"} <= {*axes.get_legend_handles_labels()[1]}
+    assert certification_of(sampled.certificate(sampled.FAMILY)).plot_tube(Figure().subplots()).patches
+    with pytest.raises(tc.SpecError, match="the states are p, v"):
+        cart.plot_tube(axes, states=("p", "q"))
+
+
 def test_nothing_is_handed_out_that_is_not_proven():
     found = certification_of(sampled.undecided(Lack(kind="wish", where="p", needed=0.2, allowed=0.15)))
     assert not found.certified

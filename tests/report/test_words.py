@@ -91,16 +91,8 @@ def test_every_label_of_every_first_screen_has_a_page(kind):
 def test_every_certificate_verdict_and_choice_of_gains_has_a_page():
     words = [*SECTIONS.values(), *(name.letter for name in NAMES), *Verdict, *ROLES.values()]
     words += (
-        "kappa",
-        "Lyapunov",
-        "contraction",
-        "matched",
-        "geodesic",
-        "witness",
-        "L1",
-        "class",
-        "predictor",
-    )
+        "kappa", "Lyapunov", "contraction", "matched", "geodesic", "witness", "L1", "class", "predictor",
+    )  # fmt: skip
     assert [word for word in words if getattr(pages.find(word), "kind", "") != "word"] == []
     assert [word for word in ("26a", "26b", "26c", "C1", "C2", "C3") if not pages.find(word)] == []
 

@@ -46,6 +46,9 @@ def test_the_same_from_code_of_a_family(files):
     assert "<SampledSimulation: not falsified pendulum" in repr(found)
     assert "attained" in found._repr_html_()
     assert found.figure("plane").axes
+    assert len(found.figure("states").axes) == len(found.figure("tube_use").axes)
+    with pytest.raises(KeyError, match="profile is no figure; there are tube_use, plane, states, inputs"):
+        found.figure("profile")
     names = found.save("a")
     assert found.save("b") == names
     assert all((files / "a" / name).read_bytes() == (files / "b" / name).read_bytes() for name in names)

@@ -6,23 +6,21 @@ certificate says, and `recheck` tells whether that is so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from tubecert.asking import require_installed
 from tubecert.certificate import file
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result
 from tubecert.enclosure.interval import Array
-from tubecert.errors import SpecError
-from tubecert.findings import Finding
 from tubecert.kinds import name_of
 from tubecert.kinds.kind import SectionData
 from tubecert.library.specification import Specification
-from tubecert.library.stated import Stated, array, rounded_up
+from tubecert.library.stated import Stated, array, axes_of, rounded_up
 from tubecert.records import Json
 from tubecert.report.certificate_brief import reasons
+from tubecert.report.figures_axes import Chart
 from tubecert.report.figures_file import paint
 from tubecert.report.figures_gains import trade_off
 from tubecert.report.figures_tube import plane_figure, state_figures
@@ -143,54 +141,21 @@ class Certification(Stated[Certificate]):
 
     # figures
 
-    def plot_tube(self, ax: Axes | None = None, *, states: tuple[str, str] | None = None) -> Axes:
-        """Draw plan, tube, safe set and obstacles in the plane of two states (the first two); returns the axes.
-
-        A single state is drawn against time. Needs matplotlib (the extra `simulate`).
-        """
-        system, axes = self.effective.system, _axes(ax)
-        if len(system.states) == 1:
-            for chart in state_figures(self.result):
-                paint(axes, chart)
-            return axes
-        one, other = _places(system.states, states or system.states[:2])
-        paint(axes, plane_figure(self.result, (one, other)))
-        units = [system.units.get(system.states[i], "") for i in (one, other)]
-        if units[0] == units[1]:
-            axes.set_aspect("equal", adjustable="box")
-        return axes
-
     def plot_tradeoff(self, ax: Axes | None = None) -> Axes:
         """Draw what each bandwidth needs of the adaptation rate, by kind of certificate; returns the axes.
 
         The curves are notes, which recheck does not examine. Needs matplotlib (the extra `simulate`).
         """
-        axes, chart = _axes(ax), trade_off(self.result)
+        axes, chart = axes_of(ax), trade_off(self.result)
         if chart is not None:
             paint(axes, chart)
         return axes
 
+    def _drawn(self, plane: tuple[int, int] | None) -> Iterable[Chart]:
+        return state_figures(self.result) if plane is None else [plane_figure(self.result, plane)]
+
     def _proven(self) -> Gains | None:
         return self.deciding if self.certified else None
-
-
-def _axes(ax: Axes | None) -> Axes:
-    """The axes to draw into; new ones of pyplot, which notebooks show, if there are none."""
-    if ax is not None:
-        return ax
-    require_installed("matplotlib", "simulate", "figures need")
-    import matplotlib.pyplot as plt
-
-    _, axes = plt.subplots(layout="constrained")
-    return axes
-
-
-def _places(known: tuple[str, ...], names: tuple[str, ...]) -> tuple[int, int]:
-    """Two states by name; raises `SpecError` for what are no two states."""
-    if len(names) != 2 or len(set(names)) != 2 or not set(names) <= set(known):
-        message = f"{', '.join(map(str, names))} are not two states"
-        raise SpecError([Finding(code="TC112", message=message, help=f"the states are {', '.join(known)}")])
-    return known.index(names[0]), known.index(names[1])
 
 
 def certification_of(sealed: Json, given: Specification | None = None) -> Certification:

@@ -186,9 +186,8 @@ def verify(
     if metric is not None:
         whole, name = with_metric(whole, metric, asking.exact(rate))
     effort = Effort(gap=float(gap), budget=budget or _BUDGET)
-    return VerifiedMetric(
-        found=decided(at_rate(whole, asking.exact(rate)), effort, timed(progress)), name=name or whole.name
-    )
+    found = decided(at_rate(whole, asking.exact(rate)), effort, timed(progress))
+    return VerifiedMetric(found=found, name=name or whole.name)
 
 
 def at_rate(spec: Spec, rate: Fraction | None) -> Spec:
@@ -306,9 +305,8 @@ def wanted_of(
         text = f"the objective rate searches for the rate; {asking.named('rate')} cannot be given"
         asking.refuse(asking.named("objective"), "rate", text)
     if best in ("condition", "margin") and wanted is None:
-        asking.refuse(
-            asking.named("objective"), best, f"the objective {best} needs {asking.named('rate')}, in 1/s"
-        )
+        text = f"the objective {best} needs {asking.named('rate')}, in 1/s"
+        asking.refuse(asking.named("objective"), best, text)
     if solver is not None:
         known = "the solvers are clarabel, scs, and cvxpy:NAME for those that cvxpy knows"
         said["solver"] = solver_name(solver) or asking.refuse(asking.named("solver"), solver, known)

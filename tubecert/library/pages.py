@@ -50,10 +50,8 @@ class Report(Paged):
 
         told = self._page().figures
         data = {f"{each.key}.svg": svg_file(each).encode() for each in told}
-        if find_spec("matplotlib") is not None:
-            data |= {
-                f"{each.key}.{ending}": painted(ending, each) for each in told for ending in ("pdf", "png")
-            }
+        endings = ("pdf", "png") if find_spec("matplotlib") is not None else ()
+        data |= {f"{each.key}.{own}": painted(own, each) for each in told for own in endings}
         os.makedirs(folder, exist_ok=True)
         data["captions.md"] = "".join(f"- {each.key}: {each.told}\n" for each in told).encode()
         for name, content in data.items():

@@ -73,9 +73,8 @@ def _plain(value: object, path: str, depth: int) -> Plain:
         return _vector(found) if path in _VECTORS else found
     if isinstance(value, _Expression):
         return _expression(value, path)
-    return _refuse(
-        path, f"{shown(value)} has no place in a specification", "give a text, a number, a list or a mapping"
-    )
+    message = f"{shown(value)} has no place in a specification"
+    return _refuse(path, message, "give a text, a number, a list or a mapping")
 
 
 def _vector(value: Plain) -> Plain:
@@ -133,9 +132,8 @@ def _check_atom(atom: object, path: str) -> None:
     if text == "pi" and not _is(atom, "is_Symbol"):
         return
     if not any(_is(atom, kind) for kind in _ATOMS):
-        _refuse(
-            path, f"{text} of {type(atom).__name__} has no meaning here", "write it as a text, or as a number"
-        )
+        message = f"{text} of {type(atom).__name__} has no meaning here"
+        _refuse(path, message, "write it as a text, or as a number")
     if _is(atom, "is_Symbol") and not (text.isidentifier() and text != "pi"):
         _refuse(path, f"the symbol {text[:40]!r} is no name", "use letters, digits and _")
 

@@ -5,7 +5,7 @@ In: a specification with `hardware`, or a certificate. Out: views of what the ce
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -17,7 +17,8 @@ from tubecert.library.certifying import ran
 from tubecert.library.specification import Specification
 from tubecert.library.stated import Stated, array, rounded, rounded_up
 from tubecert.progress import Phase, Progress, Step
-from tubecert.report.figures_sampled import band
+from tubecert.report.figures_axes import Chart
+from tubecert.report.figures_sampled import band, plane_figure, state_figures
 from tubecert.report.page import Reason
 from tubecert.sampled_loop.record import Certificate, Result, Shares, certificate_text
 from tubecert.spec import Spec
@@ -97,6 +98,9 @@ class SampledCertification(Stated[Certificate]):
         if not self.certified or not t.size:
             return None
         return Tube(t=array(t), lower=array(x - widths), upper=array(x + widths), plan=array(x))
+
+    def _drawn(self, plane: tuple[int, int] | None) -> Iterable[Chart]:
+        return state_figures(self.certificate) if plane is None else [plane_figure(self.certificate, plane)]
 
     def controller(self) -> SampledController:
         """The proven controller, from its first sample on; a new one for every run.

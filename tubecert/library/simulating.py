@@ -132,10 +132,8 @@ def require_ready(system: Spec) -> None:
     if system.hardware is not None:
         asking.require_nothing_of_a_metric()
     asking.require_installed(EXTRA, "simulate", "simulate needs")
-    of_families = [
-        asking.named(name) for name in ("members", "plan") if asking.asker().given.get(name) is not None
-    ]
-    if of_families:
+    given = asking.asker().given
+    if of_families := [asking.named(name) for name in ("members", "plan") if given.get(name) is not None]:
         from tubecert.simulation.adaptive.reading import require_family
 
         require_family(system, of_families)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Final
@@ -38,6 +39,7 @@ class _Campaign(Shown):
 
     campaign: Any = field(repr=False)
     drawn_in: ClassVar[str]  # the module of its figures
+    within: ClassVar[Mapping[str, str]] = {}  # by a view the figure that has it
 
     @property
     def outcome(self) -> str:
@@ -64,12 +66,15 @@ class _Campaign(Shown):
     def figure(self, name: str = "tube_use") -> Figure:
         """A figure; draw into its axes what you like.
 
-        `tube_use` or `plane`; of loops that adapt also `states`, `inputs` or `monte_carlo`. Raises `KeyError` for a
-        name that is none, or of which there is nothing to draw.
+        `tube_use`, `states`, `inputs` or `plane` (of a sampled loop the first three are one); of loops that adapt also
+        `monte_carlo`. Raises `KeyError` for a name that is none, or of which there is nothing to draw.
         """
         from tubecert.simulation.figures import drawn
 
-        found = drawn(import_module(self.drawn_in).DRAWERS, name, self.campaign)
+        drawers, own = import_module(self.drawn_in).DRAWERS, self.within.get(name, name)
+        if own not in drawers:
+            raise KeyError(f"{name} is no figure; there are {', '.join([*drawers, *self.within])}")
+        found = drawn(drawers, own, self.campaign)
         if found is None:
             raise KeyError(f"{name}: there is nothing that it could show")
         return found
@@ -131,6 +136,7 @@ class SampledSimulation(_Campaign):
 
     campaign: SampledCampaign = field(repr=False)
     drawn_in = "tubecert.simulation.sampled.figures"
+    within: ClassVar[Mapping[str, str]] = {"states": "tube_use", "inputs": "tube_use"}
 
     @property
     def runs(self) -> int:

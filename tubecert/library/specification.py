@@ -78,9 +78,8 @@ class Specification:
         return hash(self.hash)
 
     def __repr__(self) -> str:
-        return (
-            f"<Specification {self.name}: states {', '.join(self.states)}; inputs {', '.join(self.inputs)}>"
-        )
+        told = f"states {', '.join(self.states)}; inputs {', '.join(self.inputs)}"
+        return f"<Specification {self.name}: {told}>"
 
     def _repr_html_(self) -> str:
         from tubecert.report import notebook
@@ -125,17 +124,14 @@ def settings_in(spec: Spec | None) -> list[Setting]:
 
 def require_once(settings: Iterable[Setting]) -> None:
     """Raises `SpecError` for everything asked that says what a key says that was set in the specification."""
-    findings = []
+    findings, given = [], asker().given
     for setting in settings:
+        source = str(setting)
+        place = NamedPlace(file=setting.place, line=1, column=1, source=source, width=len(setting.path))
         for name, kind in asker().words.items():
-            if kind.sets and asker().given.get(name) is not None and setting.meets(kind.sets):
+            if kind.sets and given.get(name) is not None and setting.meets(kind.sets):
                 message = f"{named(name)} is given, too, and says what {kind.sets} is"
-                place = NamedPlace(
-                    file=setting.place, line=1, column=1, source=str(setting), width=len(setting.path)
-                )
-                findings.append(
-                    Finding(code="TC104", message=message, location=place, help="keep one of them")
-                )
+                findings += [Finding(code="TC104", message=message, location=place, help="keep one of them")]
     if findings:
         raise SpecError(findings)
 
@@ -144,9 +140,8 @@ def settings_of(given: Data | Sequence[Setting]) -> list[Setting]:
     """Keys that are set, with the texts of their values; raises `SpecError`."""
     if not isinstance(given, Mapping):
         return list(given)
-    return [
-        Setting.of(f"{key}={plain.entry_text(value, str(key))}", "settings") for key, value in given.items()
-    ]
+    texts = (f"{key}={plain.entry_text(value, str(key))}" for key, value in given.items())
+    return [Setting.of(text, "settings") for text in texts]
 
 
 def source_of(spec: Specifiable) -> tuple[Source, Spec | None]:

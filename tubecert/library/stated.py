@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from types import MappingProxyType
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
+from tubecert.asking import require_installed
 from tubecert.certificate import file
 from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
@@ -18,11 +19,14 @@ from tubecert.errors import SpecError
 from tubecert.findings import Finding
 from tubecert.library.shown import Shown
 from tubecert.library.specification import File, Specification
+from tubecert.report.figures_axes import Chart
+from tubecert.report.figures_file import paint
 from tubecert.sampled_loop.record import Certificate as SampledCertificate
 from tubecert.spec import load_text
 from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
     from tubecert.report.page import Page
@@ -104,8 +108,44 @@ class Stated(Shown, Generic[C]):
         """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`."""
         file.write_text(os.fspath(path), self.text, "choose another file")
 
+    def plot_tube(self, ax: Axes | None = None, *, states: tuple[str, str] | None = None) -> Axes:
+        """Draw plan, tube, safe set and obstacles in the plane of two states (the first two); returns the axes.
+
+        A single state is drawn against time. Needs matplotlib (the extra `simulate`).
+        """
+        axes, known = axes_of(ax), self.states
+        plane = None if len(known) == 1 else _places(known, states or known[:2])
+        for chart in self._drawn(plane):
+            paint(axes, chart)
+        if plane is not None and len({self.units.get(known[i], "") for i in plane}) == 1:
+            axes.set_aspect("equal", adjustable="box")
+        return axes
+
+    def _drawn(self, plane: tuple[int, int] | None) -> Iterable[Chart]:
+        """The plane of two states, by their places; without one every state over time."""
+        raise NotImplementedError
+
     def _page(self) -> Page:
         return page_of(self.certificate, all_of_it=False)
+
+
+def axes_of(ax: Axes | None) -> Axes:
+    """The axes to draw into; new ones of pyplot, which notebooks show, if there are none."""
+    if ax is not None:
+        return ax
+    require_installed("matplotlib", "simulate", "figures need")
+    import matplotlib.pyplot as plt
+
+    _, axes = plt.subplots(layout="constrained")
+    return axes
+
+
+def _places(known: tuple[str, ...], names: tuple[str, ...]) -> tuple[int, int]:
+    """Two states by name; raises `SpecError` for what are no two states."""
+    if len(names) != 2 or len(set(names)) != 2 or not set(names) <= set(known):
+        message = f"{', '.join(map(str, names))} are not two states"
+        raise SpecError([Finding(code="TC112", message=message, help=f"the states are {', '.join(known)}")])
+    return known.index(names[0]), known.index(names[1])
 
 
 def page_of(

@@ -137,17 +137,14 @@ class Swept(Shown):
         drawn = [name for name in self.files if name.startswith("figures/")]
         others = sorted({*self.files} - {*drawn})
         rows = [("page" if name == _PAGE else "table", str(self.folder / name)) for name in others]
-        return rows + (
-            [("figures", f"{self.folder / 'figures'}: {len(drawn)} drawings (SVG)")] if drawn else []
-        )
+        figures = ("figures", f"{self.folder / 'figures'}: {len(drawn)} drawings (SVG)")
+        return [*rows, figures] if drawn else rows
 
     def _json(self) -> str:
-        cells = (
-            [exact_json(each) if isinstance(each, Fraction) else each for each in row]
-            for row in self.table.cells()
+        rows = [dict(zip(self.table.header, row, strict=True)) for row in self.table.cells()]
+        return json_text(
+            [{k: exact_json(v) if isinstance(v, Fraction) else v for k, v in row.items()} for row in rows]
         )
-        rows = [dict(zip(self.table.header, row, strict=True)) for row in cells]
-        return json_text(rows)
 
     @property
     def _exit_code(self) -> ExitCode:

@@ -50,10 +50,7 @@ def trade_off(result: Result) -> Chart | None:
 
 def _place(row: Gains) -> Point | None:
     """Where a row is drawn: its bandwidth and its rate."""
-    pair = row.pair
-    if pair.bandwidth is None or pair.adaptation_rate is None:
-        return None
-    return float(pair.bandwidth), float(pair.adaptation_rate)
+    return None if row.omega is None or row.Gamma is None else (row.omega, row.Gamma)
 
 
 def rate_figures(rows: Sequence[MetricRow]) -> Iterator[Chart]:

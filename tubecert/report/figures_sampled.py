@@ -56,26 +56,36 @@ def band(certificate: Certificate) -> tuple[Array, Array, Array]:
 
 def figures(certificate: Certificate) -> Iterator[Chart]:
     """All of them, as far as there is something to draw."""
-    result, (t, x, widths) = certificate.result, band(certificate)
+    result, effective = certificate.result, certificate.result.spec.effective
+    yield from state_figures(certificate)
+    t, *_ = band(certificate)
     if t.size:
-        yield from _over_time(certificate, t, x, widths)
-        yield from _planes(result, x, widths)
-    if result.tube and result.spec.effective.trajectory.kind != "equilibrium":
+        yield from _inputs(certificate, t)
+        for names in dict.fromkeys(obstacle.states for obstacle in effective.obstacles):
+            i, j = map(effective.system.states.index, names)
+            yield plane_figure(certificate, (i, j))
+    if result.tube and effective.trajectory.kind != "equilibrium":
         yield from _deviations(result)
     if certificate.notes.filled:
-        own = result.spec.effective
-        yield _bars(own.system.ordered(certificate.notes.filled), causes(own))
+        yield _bars(effective.system.ordered(certificate.notes.filled), causes(effective))
 
 
-def _over_time(certificate: Certificate, t: Array, x: Array, widths: Array) -> Iterator[Chart]:
-    result, notes = certificate.result, certificate.notes
+def state_figures(certificate: Certificate) -> Iterator[Chart]:
+    """Every state of the plan with its half-width; none of a family, nor without a tube."""
+    result, (t, x, widths) = certificate.result, band(certificate)
     system, safe, proven, told = result.spec.effective.system, _safe_set(result), *_proven(result)
-    for i, name in enumerate(system.states):
+    for i, name in enumerate(system.states if t.size else ()):
         sides, label = (x[:, i] - widths[:, i], x[:, i] + widths[:, i]), labelled(name, system)
         words = "safe set", told
         yield over_time(
             f"state-{i}", name, label, (t, x[:, i]), band=sides, limits=safe[name], words=words, proven=proven
         )
+
+
+def _inputs(certificate: Certificate, t: Array) -> Iterator[Chart]:
+    """Every input of the plan, and what it stays within."""
+    result, notes = certificate.result, certificate.notes
+    system, (proven, told) = result.spec.effective.system, _proven(result)
     for use in result.inputs:
         i, words, label = system.inputs.index(use.input), ("limits", told), labelled(use.input, system)
         u = np.interp(t, notes.samples_t, np.array(notes.samples_u)[:, i])
@@ -115,21 +125,20 @@ def _deviations(result: Result) -> Iterator[Chart]:
         )
 
 
-def _planes(result: Result, x: Array, widths: Array) -> Iterator[Chart]:
-    """The planes in which there are obstacles, with the widest tube."""
+def plane_figure(certificate: Certificate, pair: tuple[int, int]) -> Chart:
+    """The widest tube in the plane of two states, by their places; of a family, or without one, what is beside it."""
+    result, (_, x, widths) = certificate.result, band(certificate)
     effective, safe = result.spec.effective, _safe_set(result)
-    for names in dict.fromkeys(obstacle.states for obstacle in effective.obstacles):
-        i, j = map(effective.system.states.index, names)
-        tube = widths[:, [i, j]].max(axis=0) * [(1, 1), (-1, 1), (-1, -1), (1, -1)]
-        plane = Plane(
-            effective=effective,
-            pair=(i, j),
-            plan=x[:, [i, j]],
-            tube=tube,
-            safe=(safe[names[0]], safe[names[1]]),
-            proven=_proven(result)[0],
-        )
-        yield plane.chart(f"plane-{i}-{j}")
+    one, other = (safe[effective.system.states[i]] for i in pair)
+    plane = Plane(
+        effective=effective,
+        pair=pair,
+        plan=x[:, pair],
+        tube=widths[:, pair].max(axis=0, initial=0) * [(1, 1), (-1, 1), (-1, -1), (1, -1)],
+        safe=(one, other),
+        proven=_proven(result)[0],
+    )
+    return plane.chart(f"plane-{pair[0]}-{pair[1]}")
 
 
 def _bars(filled: Mapping[str, Shares], words: Mapping[str, str]) -> Chart:

@@ -61,12 +61,8 @@ def _of_kind(result: Result, key: str) -> list[tuple[str, float]]:
 
 
 def _began(recipe: Recipe) -> str:
-    until = (
-        "the feedback has made it good"
-        if isinstance(recipe, NoGains)
-        else "the filter has learned the uncertainty"
-    )
-    return f"the start, until {until}"
+    alone = isinstance(recipe, NoGains)
+    return f"the start, until the {'feedback has made it good' if alone else 'filter has learned the uncertainty'}"
 
 
 def _pushes(result: Result, n: Numbers[Interval], recipe: Recipe) -> Iterator[tuple[str, Interval]]:
