@@ -15,8 +15,7 @@ from tubecert.certificate.result import Result
 from tubecert.simulation.adaptive.continuous import DIVERGED
 from tubecert.simulation.adaptive.engine import integrate
 from tubecert.simulation.adaptive.loops import Cases, Disturbance, Found, Loop, Problem, Runs, Seen, Sizes
-from tubecert.simulation.adaptive.reading import adopted
-from tubecert.simulation.adaptive.setting import Setting, setting_of
+from tubecert.simulation.adaptive.setting import Setting, adopted, setting_of
 from tubecert.spec import Spec, load, load_text
 
 

@@ -13,7 +13,7 @@ from tubecert.certificate import dump, seal
 from tubecert.certificate.result import Result
 from tubecert.errors import ExitCode
 from tubecert.recheck.run import recheck
-from tubecert.simulation.adaptive.reading import adopted
+from tubecert.simulation.adaptive.setting import adopted
 from tubecert.spec import canonical, load
 from tubecert.spec.document import compose
 from tubecert.spec.override import Setting, put

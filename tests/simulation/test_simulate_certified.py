@@ -18,8 +18,14 @@ from tubecert.errors import ExitCode, TubecertError
 from tubecert.letters import ADAPTIVE, name_of, words_of
 from tubecert.model import build
 from tubecert.recheck.run import recheck
-from tubecert.simulation.adaptive.reading import adopted, certified_plan, require_tube
-from tubecert.simulation.adaptive.setting import CHOSEN, Choice, loop_of, setting_of
+from tubecert.simulation.adaptive.setting import (
+    CHOSEN,
+    Choice,
+    adopted,
+    loop_of,
+    require_tube,
+    setting_of,
+)
 from tubecert.spec import load, load_text
 from tubecert.verdict import Verdict
 
@@ -93,8 +99,7 @@ def test_without_a_tube_there_is_nothing_to_simulate(verdict, code):
 
 @pytest.mark.slow
 def test_the_plan_is_that_of_the_certificate():
-    spec, result = certified("two_state", "0.4")
-    plan = certified_plan(spec, build(spec), result)
+    plan = setting("two_state", "0.4").plan
     assert plan.knots.x[0] == (Fraction("3.4"), Fraction("-2.4"))
     x, _ = plan.enclose(np.array([5.0]), np.array([5.0]))
     assert np.abs(x.mid).max() < 0.05

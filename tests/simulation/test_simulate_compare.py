@@ -13,8 +13,7 @@ from tubecert.conditions.inputs import InputBound
 from tubecert.errors import TubecertError
 from tubecert.letters import DISTANCE, RATES
 from tubecert.simulation.adaptive.judge import check_class, compare
-from tubecert.simulation.adaptive.loops import joined
-from tubecert.simulation.adaptive.reading import Decay
+from tubecert.simulation.adaptive.loops import Decay, joined
 from tubecert.simulation.adaptive.setting import promise, setting_of
 from tubecert.simulation.adaptive.uncertainty import class_of
 from tubecert.simulation.told import RunAt

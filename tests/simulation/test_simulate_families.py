@@ -17,8 +17,7 @@ from tubecert.model import build
 from tubecert.pipeline.membership import membership
 from tubecert.simulation.adaptive.campaign import follow
 from tubecert.simulation.adaptive.families import drawing_of, members_of
-from tubecert.simulation.adaptive.reading import adopted
-from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
+from tubecert.simulation.adaptive.setting import Choice, adopted, loop_of, setting_of
 from tubecert.spec import Knots, Table, load_text
 from tubecert.trajectory.pieces import piecewise_plan
 

@@ -99,8 +99,7 @@ def simulate(
         return _sampled(found, system, timed(progress), duration=asking.exact(duration), runs=runs, seed=seed)
     from tubecert.library.simulation import Simulation
     from tubecert.simulation.adaptive import campaign, families
-    from tubecert.simulation.adaptive.reading import adopted, require_tube
-    from tubecert.simulation.adaptive.setting import Choice, loop_of
+    from tubecert.simulation.adaptive.setting import Choice, adopted, loop_of, require_tube
 
     default, system = system.simulation or Section(), adopted(system, found.result)
     require_tube(found.result)
@@ -134,7 +133,7 @@ def require_ready(system: Spec) -> None:
     asking.require_installed(EXTRA, "simulate", "simulate needs")
     given = asking.asker().given
     if of_families := [asking.named(name) for name in ("members", "plan") if given.get(name) is not None]:
-        from tubecert.simulation.adaptive.reading import require_family
+        from tubecert.simulation.adaptive.setting import require_family
 
         require_family(system, of_families)
 

@@ -10,8 +10,7 @@ Implements: theory 2 to 4b, the loops.
 | `continuous` | lanes from start to end: plant, disturbance, feedback, and the stages around the fast part; peaks |
 | `flows` | (xtilde, sigma_hat, u_a): exact where linear, and caught at the ball of the projection |
 | `geodesics`, `times` | Chebyshev geodesics; the times of the steps, and the plan at them |
-| `reading` | a certificate, read back |
-| `setting` | plan, times, starts, loops with their gains, certified or chosen, and what is promised of them |
+| `setting` | a certificate, read back: plan, starts; loops, their gains, certified or chosen, and their promises |
 | `families` | random plans of a family |
 | `uncertainty` | random members and adversaries of the certified class |
 | `campaign` | all that one command simulates: loops, random runs, and a search for the worst |

@@ -140,7 +140,7 @@ class Campaign:
             return "no result"
         if self.interrupted:
             return "interrupted"
-        return "not falsified" if any(own.loop.covered for own in found) else "nothing claimed"
+        return "not falsified" if any(own.loop.promise for own in found) else "nothing claimed"
 
     def summary(self, certificate: str) -> Json:
         """What `summary.json` holds; `certificate` is the hash of the one that was compared with."""

@@ -110,15 +110,10 @@ def _resolved(vector: Vector, lanes: Places, tolerance: float) -> Found:
         near = (told <= _ENOUGH * tolerance) & (beside <= 1)
         done = np.where(failed[level, lanes], agree, near)
         if level >= _DOUBTFUL:
-            done |= _hopeless(changes[: level + 1, lanes], failed[: level + 1, lanes])
+            then = changes[level - _PATIENCE, lanes]
+            done |= np.isfinite(change) & np.isfinite(then) & (change > 0.5 * then)
+            done |= failed[level - _PATIENCE : level + 1, lanes].all(axis=0)
         lanes = lanes[~done]
         if not len(lanes):
             break
     return best
-
-
-def _hopeless(changes: Array, failed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether smaller steps do not help: a change that stays, or a lane that is stopped at every level."""
-    now, then = changes[-1], changes[-1 - _PATIENCE]
-    stays = np.isfinite(now) & np.isfinite(then) & (now > 0.5 * then)
-    return np.asarray(stays | failed[-1 - _PATIENCE :].all(axis=0))

@@ -133,22 +133,18 @@ def _inputs(campaign: Campaign) -> Figure:
 
 def _tube_use(campaign: Campaign) -> Figure:
     """The distance over time, as a share of the tube; above 1 the tube is left."""
-    reach = campaign.setting.reach
-    figure = blank(7.0, 3.4)
+    reach, figure, most = campaign.setting.reach, blank(7.0, 3.4), 1.0
     axis = figure.subplots()
-    most = 1.0
     for item in campaign.loops:
-        share = item.runs.distance[0] / reach
+        t, share = item.runs.t, item.runs.distance[0] / reach
         most = max(most, float(np.nanmax(share)))
-        _draw(axis, item.loop, item.runs.t, share)
+        _draw(axis, item.loop, t, share)
         if item.loop.promise is not None and item.loop.promise.decay is not None:
-            bound = item.loop.promise.decay(item.runs.t) / reach
-            _draw(axis, item.loop, item.runs.t, bound, "certified D(t), ", lw=1.0, ls=":")
-    for attack in campaign.attacks:
-        if attack.adversary is not None:
-            worst = attack.adversary.runs
-            share = worst.distance[0] / reach
-            _draw(axis, attack.random.loop, worst.t, share, "worst adversary, ", lw=1.0, alpha=0.5)
+            bound = item.loop.promise.decay(t) / reach
+            _draw(axis, item.loop, t, bound, "certified D(t), ", lw=1.0, ls=":")
+    for worst in (attack.adversary for attack in campaign.attacks if attack.adversary):
+        share = worst.runs.distance[0] / reach
+        _draw(axis, worst.loop, worst.runs.t, share, "worst adversary, ", lw=1.0, alpha=0.5)
     axis.axhspan(0, 1, color=TUBE, alpha=0.18, lw=0)
     axis.axhline(1, color=TUBE, lw=1.0)
     axis.set_ylim(0, min(1.06 * most, _FARTHEST))
@@ -160,21 +156,21 @@ def _monte_carlo(campaign: Campaign) -> Figure | None:
     """How the runs of a sample are spread over the tube, over time."""
     if not campaign.attacks:
         return None
-    (attack,), reach = campaign.attacks, campaign.setting.reach
-    figure, color, runs = blank(7.0, 3.6), COLORS[attack.random.loop.controller], attack.random.runs
-    axis, share = figure.subplots(), runs.distance / reach
+    (attack,), reach, figure = campaign.attacks, campaign.setting.reach, blank(7.0, 3.6)
+    loop, runs, worst = attack.random.loop, attack.random.runs, attack.adversary
+    axis, share, color = figure.subplots(), runs.distance / reach, COLORS[loop.controller]
     alive = ~np.isnan(share).all(axis=0)
     t, share = runs.t[alive], share[:, alive]
     low, q25, median, q75, high = np.nanquantile(share, [0, 0.25, 0.5, 0.75, 1], axis=0)
     axis.fill_between(t, low, high, color=color, alpha=0.18, lw=0, label=f"{len(share)} random runs")
     axis.fill_between(t, q25, q75, color=color, alpha=0.35, lw=0, label="middle half")
     axis.plot(t, median, color=color, label="median")
-    if attack.adversary is not None:
-        worst = attack.adversary.runs
-        axis.plot(worst.t, worst.distance[0] / reach, color="black", lw=1.0, label="worst adversary")
-    if attack.random.loop.promise is not None and attack.random.loop.promise.decay is not None:
-        bound = attack.random.loop.promise.decay(t) / reach
-        axis.plot(t, bound, color=TUBE, lw=1.4, ls="--", label="certified D(t)")
+    if worst is not None:
+        axis.plot(
+            worst.runs.t, worst.runs.distance[0] / reach, color="black", lw=1.0, label="worst adversary"
+        )
+    if loop.promise is not None and loop.promise.decay is not None:
+        axis.plot(t, loop.promise.decay(t) / reach, color=TUBE, lw=1.4, ls="--", label="certified D(t)")
     axis.axhline(1, color=TUBE, lw=1.2, label="tube")
     axis.set_ylim(0, min(max(1.08, 1.05 * float(np.nanmax(share))), _FARTHEST))
     axis.set_ylabel("d(x*, x) / dbar")
@@ -228,12 +224,9 @@ def _section(setting: Setting, i: int, j: int) -> Array:
     For a constant metric that is the projection of the ellipsoid d < dbar; else that of |S (x - x*)| < rho, a disc
     where z is x, cut to the half-widths.
     """
-    angle = np.linspace(0.0, 2 * np.pi, 73)[:-1]
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    W = setting.model.W
-    if all(e.is_constant for row in W for e in row):
-        values = Tape([W[a][b] for a in (i, j) for b in (i, j)], ()).run_floats([], ()).reshape(2, 2)
-        return np.asarray(setting.reach * circle @ np.linalg.cholesky(values).T)
-    widths = setting.box[[i, j]]
-    spread = np.linalg.inv(setting.S.T @ setting.S)[np.ix_([i, j], [i, j])]
-    return np.clip(setting.rho * circle @ np.linalg.cholesky(spread).T, -widths, widths)
+    angle, W = np.linspace(0.0, 2 * np.pi, 73)[:-1], [e for row in setting.model.W for e in row]
+    size, spread = setting.rho, np.asarray(np.linalg.inv(setting.P))
+    if all(e.is_constant for e in W):
+        size, spread = setting.reach, Tape(W, ()).run_floats([], ()).reshape(spread.shape)
+    root, width = np.linalg.cholesky(spread[np.ix_([i, j], [i, j])]), setting.box[[i, j]]
+    return np.clip(size * np.stack([np.cos(angle), np.sin(angle)], axis=1) @ root.T, -width, width)

@@ -22,8 +22,7 @@ from tubecert.expression import Expression, derivatives
 from tubecert.findings import Finding
 from tubecert.model import TIME
 from tubecert.simulation.adaptive.continuous import reason
-from tubecert.simulation.adaptive.loops import Runs, Sizes
-from tubecert.simulation.adaptive.reading import Promise
+from tubecert.simulation.adaptive.loops import Promise, Runs, Sizes
 from tubecert.simulation.adaptive.setting import Setting
 from tubecert.simulation.obstacles import in_plane, signed_distance
 from tubecert.simulation.told import Clearance, Peak, RunAt, Stopped, Violation, Went

@@ -9,19 +9,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tubecert.conditions.inputs import InputBound
 from tubecert.enclosure.interval import Array
 from tubecert.expression import Expression
 from tubecert.expression.matrix import Matrix
 from tubecert.model import ControlAffineModel
 from tubecert.records import to_json
-from tubecert.simulation.adaptive.reading import Promise
 from tubecert.trajectory import Plan
 
 R = TypeVar("R")
@@ -45,6 +45,45 @@ class LoopGains:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Decay:
+    """D(t) of theorem B: d(x*, x) <= D(t), (2.15)."""
+
+    rate: float
+    bandwidth: float
+    start: float  # d0
+    beta: float
+    defect: float
+    first: float  # H0
+    rest: float  # S
+    error: float  # e, of the estimate, which is there from the start
+
+    def __call__(self, t: Array) -> Array:
+        """D at times t (K,)."""
+        settled = (self.beta * (self.rest + self.error) + self.defect) / self.rate
+        gap = self.bandwidth - self.rate
+        e_rate, e_band = np.exp(-self.rate * t), np.exp(-self.bandwidth * t)
+        K = t * e_rate if abs(gap) < 1e-9 * self.rate else (e_rate - e_band) / gap
+        return np.asarray(
+            settled + (self.start - settled) * e_rate + self.beta * (self.first - self.rest) * K
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Promise:
+    """What is certified of the adaptive loop: `bounds` by the names of peaks, half-widths by state and output.
+
+    `ultimate` is the radius in the long run, `decay` the bound of the distance over time; either may be missing.
+    `ranges`: those of inputs that have limits, by name.
+    """
+
+    bounds: Mapping[str, float]
+    half_widths: Mapping[str, float]
+    ranges: Mapping[str, InputBound]
+    ultimate: float | None = None
+    decay: Decay | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Loop:
     """A closed loop, what its gains are, and the promise about it, if there is one."""
 
@@ -64,16 +103,11 @@ class Loop:
         return self.controller in ("reference", "l1")
 
     @property
-    def covered(self) -> bool:
-        """Whether a certificate is about it."""
-        return self.promise is not None
-
-    @property
     def data(self) -> dict[str, object]:
         """What is told of it."""
         told = {"controller": self.controller, "gains_are": self.gains_are}
         gains = {} if self.gains is None else {"gains": to_json(self.gains)}
-        return told | {"covered": self.covered, "tested": self.adapts} | gains
+        return told | {"covered": self.promise is not None, "tested": self.adapts} | gains
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,12 +1,13 @@
-"""What is simulated: plan, times, starts, what a certificate proves; loops, their gains, and what they promise.
+"""A certificate, read back: plan, times, starts, what it proves; loops, their gains, and what is promised of them.
 
+Nothing is believed that the hash does not cover; nothing is proven here either (that is `recheck`'s task).
 Implements: theory 4, the bounds D(t), |k| <= du dbar, |xtilde| <= Dxt/sqrt(Gamma), |sigma_hat - h| <= Dh + R_H.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final, Literal
@@ -14,8 +15,10 @@ from typing import Final, Literal
 import numpy as np
 
 from tubecert.bounds.wind import Beside
+from tubecert.certificate.belonging import as_set, compared
 from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
+from tubecert.claims.advice import advice
 from tubecert.conditions.distance import DistanceRecipe
 from tubecert.conditions.rates import RateRecipe
 from tubecert.coordinates import Coordinates, Fields
@@ -28,19 +31,21 @@ from tubecert.expression.matrix import Matrix, column, combine, multiply
 from tubecert.findings import Finding
 from tubecert.kinds import DISTANCE, Name, name_of
 from tubecert.model import ControlAffineModel, build
-from tubecert.simulation.adaptive.loops import Controller, Loop, LoopGains, Problem
-from tubecert.simulation.adaptive.reading import Decay, Gains, Promise, certified_plan, sup
+from tubecert.simulation.adaptive.loops import Controller, Decay, Loop, LoopGains, Problem, Promise
 from tubecert.simulation.adaptive.times import output_times
-from tubecert.simulation.adaptive.uncertainty import Class, class_of
-from tubecert.spec import Spec
+from tubecert.simulation.adaptive.uncertainty import Class, class_of, sup
+from tubecert.spec import Spec, load_text
 from tubecert.trajectory import Plan
+from tubecert.trajectory.make import plan_of
 from tubecert.verdict import Verdict
 
+_UNUSED: Final = ("initial_state", "obstacles", "simulation", "expect", "conditions")  # of a metric alone
 CHOSEN: Final = "chosen, not certified"
 _TOLERANCE: Final = 1e-3  # of the tube's least radius, asked of the integrator
 _LIMIT: Final = 100  # of the greatest radius: what is further away from the plan is not followed any more
 _DEGREE: Final = 5  # of the polynomials that geodesics are
 _EVEN, _EVEN_DEGREE = 1.01, 3  # where M varies by a factor of less over the tube, cubic ones are as near
+Gains = RateRecipe | DistanceRecipe
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -109,6 +114,43 @@ class Setting(Problem):
         return recipe if certified and isinstance(recipe, (RateRecipe, DistanceRecipe)) else None
 
 
+def adopted(spec: Spec, result: Result) -> Spec:
+    """The specification with what the certification had changed: what the command line gave, a new metric.
+
+    Raises `ForeignError` if the certificate is about another system.
+    """
+    compared(spec, result).require(spec, "the certificate")
+    other = load_text(result.spec.effective.at_rest(_UNUSED), "certificate")
+    spec = replace(as_set(spec, result.overrides.settings), tube=other.tube)
+    if result.overrides.metric is None and spec.metric is not None:
+        return spec
+    return replace(spec, metric=other.metric, synthesis=other.synthesis)
+
+
+def require_family(spec: Spec, options: Sequence[str]) -> None:
+    """Raises TC708 if there is one plan only, and options say which of many is to be followed."""
+    if spec.trajectory.bundle is not None or not options:
+        return
+    message = f"{' and '.join(options)}: this specification has one plan, not a family of them"
+    help = "leave it away, or certify a family: trajectory: {kind: any, x: {...}, u: {...}}"
+    raise TubecertError(
+        [Finding(code="TC708", message=message, location=spec.location("trajectory.kind"), help=help)]
+    )
+
+
+def require_tube(result: Result) -> None:
+    """Raises the reason why there is no tube to be compared with, if there is none."""
+    if result.tube is not None and result.tube.rho_r is not None and result.constants:
+        return
+    reason = next((item for item in result.reasons if item.verdict is result.verdict), None)
+    why = "certification stopped" if reason is None else reason.sentence
+    message = f"there is no tube that a simulation could leave ({result.verdict}: {why})"
+    help = advice(reason.relax if reason else ()) or "tubecert certify tells more"
+    error = TubecertError([Finding(code="TC703", message=message, help=help)])
+    error.exit_code = (result.verdict if result.verdict is Verdict.REFUTED else Verdict.UNDECIDED).exit_code
+    raise error
+
+
 def setting_of(
     spec: Spec, result: Result, duration: Fraction | None = None, plan: Plan | None = None
 ) -> Setting:
@@ -122,7 +164,7 @@ def setting_of(
     model, rows, rho = build(spec), tube.coordinates, float(tube.rho)
     coordinates = None if rows is None else Coordinates(tuple(tuple(map(Fraction, row)) for row in rows))
     S = np.eye(len(model.states)) if coordinates is None else np.array(coordinates.rows, dtype=float)
-    single = certified_plan(spec, model, result) if plan is None else plan
+    single = plan or plan_of(spec, model, result.plan.exact_knots())
     horizon, centre, field = horizon_of(spec, duration), _start_of(single), Fields(model, coordinates)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
     reach = math.sqrt(metric.lower.below) * rho

@@ -101,8 +101,7 @@ def steps(problem: Problem, level: int, plans: Sequence[Plan], count: int | None
 
 def _course(problem: Problem, plan: Plan, start: Array, length: Array) -> Reference:
     """A plan at start, middle and end of every step (S,), and after the last one."""
-    model = problem.model
-    S = len(start)
+    model, S = problem.model, len(start)
     t = np.minimum(start[:, None] + length[:, None] * np.array([0.0, 0.5, 1.0]), problem.horizon)
     span = None
     if plan.spans is not None:

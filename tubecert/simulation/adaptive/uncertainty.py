@@ -18,11 +18,11 @@ from typing import Final
 
 import numpy as np
 
+from tubecert.certificate.file import incomplete
 from tubecert.certificate.result import Result
 from tubecert.enclosure.interval import Array
 from tubecert.model import ControlAffineModel
 from tubecert.simulation.adaptive.loops import Disturbance
-from tubecert.simulation.adaptive.reading import sup
 
 WAVES: Final = 6  # of a random member, and odd harmonics of an adversary
 _ROUND: Final = 1 - 1e-9  # sums of floats stay within the class
@@ -76,6 +76,15 @@ class Class:
         return 3 + count if count else 0
 
 
+def sup(result: Result, name: str, otherwise: float | None = None) -> float:
+    """The safe side of a constant; raises `TubecertError` if it is not known, and there is no other value for that."""
+    bound = result.constants.get(name)
+    found = otherwise if bound is None or bound.above is None else bound.above
+    if found is None:
+        raise incomplete("that is simulated", f"{name} is missing")
+    return found
+
+
 def class_of(result: Result, model: ControlAffineModel, reach: float, upper: float | None) -> Class:
     """The class that a certificate is about; pushes only where metric, with lmax(M) <= `upper`, and B are constant."""
     of, push = partial(sup, result), None
@@ -105,8 +114,9 @@ def random_members(kind: Class, genes: Array, offset: Array) -> Disturbance:
     raw = (-np.log1p(-each[:, 0])) ** _UNEVEN
     part = np.where(own[0] < _FAINT, own[1], 1.0)
     size = kind.h * _ROUND * part * raw / np.maximum(raw.sum(axis=0), _TINY)
+    shares = np.where(own[2::2] < 0.5, _ROUND, own[3::2])  # of a bound: all of it, half of the time
     rates, steepness = (
-        _budgeted(10 ** (2.5 * each[:, 1 + i] - 1.5), size, bound * _share(own[2 + 2 * i : 4 + 2 * i]))
+        _budgeted(10 ** (2.5 * each[:, 1 + i] - 1.5), size, bound * shares[i])
         for i, bound in enumerate((kind.h_t, kind.h_x))
     )
     amplitude, wave = size[:, None] * _unit(each[:, 4 : 4 + kind.m]), _unit(each[:, 4 + kind.m :])
@@ -115,11 +125,6 @@ def random_members(kind: Class, genes: Array, offset: Array) -> Disturbance:
     still = Disturbance.nothing(kind.n, kind.m, genes.shape[1])
     waves = still._replace(amplitude=amplitude, frequency=rates, wave=wave)
     return waves._replace(phase=_phases(kind, waves, starts))
-
-
-def _share(genes: Array) -> Array:
-    """How much of a bound is used: all of it, half of the time."""
-    return np.asarray(np.where(genes[0] < 0.5, _ROUND, genes[1]))
 
 
 def _budgeted(raw: Array, size: Array, budget: Array) -> Array:
