@@ -62,11 +62,6 @@ def test_version(arguments):
     assert (result.exit_code, result.stdout) == (0, f"tubecert {__version__}\n")
 
 
-def test_help_leads_with_a_machine_as_the_readme_does():
-    told = run("--help").stdout
-    assert 0 < told.index("init robot.yaml --template machine") < told.index("tubecert certify robot.yaml\n")
-
-
 def test_version_of_what_results_rest_on():
     assert "numpy" in run("version", "-v").stdout
     assert json.loads(run("--json", "version").stdout)["tubecert"] == __version__

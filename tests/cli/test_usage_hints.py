@@ -65,10 +65,10 @@ def test_a_file_that_is_another_one(
 
 def test_a_session_is_told_in_its_order() -> None:
     said = run("--help").stdout
-    order = [
-        said.index(f"  tubecert {word} robot.") for word in ("init", "check", "synth", "certify", "report")
-    ]
+    words = "init", "check", "certify", "report", "export"
+    order = [said.index(f"  tubecert {word} robot.") for word in words]
     assert order == sorted(order)
+    assert "robot.yaml --template machine\n" in said  # as the README leads
 
 
 def test_nothing_is_guessed_of_an_option_of_one_letter(
