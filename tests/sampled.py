@@ -35,8 +35,9 @@ limits: {F: [-8, 8]}
 tube: {half_widths: {p: 0.15}}
 obstacles: [{states: [p, v], disc: {center: [0.9, 1.8], radius: 0.1}}]
 """
+POINT = "{kind: equilibrium, at: [0, 0], input: [0]}"
 FAMILY = SPEC.replace(
-    "{kind: equilibrium, at: [0, 0], input: [0]}",
+    POINT,
     "{kind: any, x: {p: [-0.2, 0.2], v: [0, 0]}, u: {F: [-1, 1]}, input_rate: 2}",
 ).replace("{at: [0.1, 0]}", "{within: 0.1}")
 DRONE = """

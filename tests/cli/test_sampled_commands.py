@@ -1,6 +1,7 @@
 """Commands on a specification with hardware: what is proven is stood in for by hand, but for one small loop."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -27,6 +28,7 @@ controller: none
 disturbance: {E: [[1]], bound: 0.3}
 """
 EXPECT = "expect: {verdict: certified, half_widths: {p: [0.1, 0.2], v: [0, 0.1]}, inputs: [0, 0.4]}\n"
+NARROW = "limits.F=[-2,2]"
 OF_METRICS = {
     "conditions", "kernel", "kinds", "search", "stages", "pipeline", "metric", "synthesis", "tube", "bounds",
 }  # fmt: skip
@@ -62,9 +64,8 @@ def test_certify_writes_and_shows():
         "              tubecert simulate cart.yaml --certificate cart.certificate.json",
         "              tubecert export cart.certificate.json -o cart.controller",
     ]
-    Path("wagon.yaml").write_text(
-        sampled.SPEC
-    )  # named by their files, as the certificate is, not by their system
+    Path("wagon.yaml").write_text(sampled.SPEC)
+    # named by their files, as the certificate is, not by their system
     next_one = "tubecert export wagon.certificate.json -o wagon.controller\n"
     assert run("certify", "wagon.yaml").stdout.endswith(next_one)
     assert json.loads(Path("cart.certificate.json").read_text())["format"] == "tubecert-sampled-loop/1"
@@ -76,13 +77,23 @@ def test_certify_writes_and_shows():
 
 
 def test_undecided_is_told_by_the_exit_code_and_leads_nowhere():
-    done = run("certify", "cart.yaml", "--set", "limits.F=[-2,2]")
+    done = run("certify", "cart.yaml", "--set", NARROW)
     assert done.exit_code == 4
     assert done.stdout.startswith(
         "undecided cart: the input F has too little room: beside the plan it needs 9 N of 2 N"
     )
     assert "tubecert recheck" not in done.stdout
     assert "tubecert report cart.certificate.json" in done.stdout
+
+
+def test_times_that_seem_to_be_in_ms_are_told_where_nothing_is_certified():
+    rows = [f"{100 * k},{math.sin(k / 10):.9f},{math.cos(k / 10):.9f},0" for k in range(9)]
+    Path("plan.csv").write_text("\n".join(["t,p,v,F", *rows]))
+    own = sampled.SPEC.replace(sampled.POINT, "{kind: csv, file: plan.csv}").replace("[0.1, 0]", "[0, 1]")
+    Path("cart.yaml").write_text(own.replace('[v, "-v"]', "[v, -p]"))
+    done = run("certify", "cart.yaml")  # a curve with the slopes of the dynamics goes far in 100 s
+    assert done.stdout.startswith("refuted cart: the plan itself leaves the safe set: p goes to ")
+    assert "\n  plan        the times seem to be in ms: " in done.stdout
 
 
 def test_all_that_is_about_a_metric_is_refused_at_once():

@@ -125,6 +125,21 @@ def test_certify_answers_for_hardware_and_refuses_what_is_about_metrics(monkeypa
         tc.synth(question, rate=1)
 
 
+@pytest.mark.parametrize(("plan", "told"), [
+    ("{kind: equilibrium, at: [-1.5, 0]}", "p goes to -1.5 m, beyond -1 m"),
+    ('{kind: expressions, x: ["1.5*sin(t)", "1.5*cos(t)"], u: [0], horizon: 2}', "p goes to 1.5 m, beyond 1 m"),
+    ("{kind: equilibrium, at: [1, 2]}", ""),  # at a corner
+])  # fmt: skip
+def test_a_plan_that_leaves_the_safe_set_is_refuted_for_that(monkeypatch, plan, told):
+    """That no tube closes was said, or that an input has too little room."""
+    lacking = sampled.undecided(Lack(kind="no_fixed_point", where="v"))
+    monkeypatch.setattr(certification, "certify", lambda spec, report: lacking)
+    found = tc.certify(tc.specification(sampled.SPEC.replace(sampled.POINT, plan)))
+    assert (found.verdict, len(found.reasons)) == ("refuted" if told else "undecided", 1)
+    assert (f"the plan itself leaves the safe set: {told}" == found.reasons[0].message) == bool(told)
+    assert ("neither proven nor refuted" in tc.report(found).markdown) != bool(told)
+
+
 def test_the_controller_is_the_recursion_of_the_record():
     """The tables as it defines them: delta = M zeta + N dy, zeta+ = F zeta + G dy."""
     certificate = handmade.certificate(handmade.REST, z=3)

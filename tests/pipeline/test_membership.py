@@ -46,29 +46,17 @@ IS = [("TC411", Severity.NOTE)]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("plan", "words"),
-    [
-        ('{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0"], horizon: 4}', ""),
-        (
-            '{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0"], horizon: 5}',
-            "lasts longer than the 4 s",
-        ),
-        ('{kind: expressions, x: ["1.1*sin(t)", "1.1*cos(t)"], u: ["0"], horizon: 4}', "p* goes 0.1 beyond"),
-        (
-            '{kind: expressions, x: ["-1.1*sin(t)", "-1.1*cos(t)"], u: ["0"], horizon: 2}',
-            "p* goes 0.1 beyond",
-        ),
-        (
-            '{kind: expressions, x: ["0.4*sin(2*t)", "0.8*cos(2*t)"], u: ["-1.2*sin(2*t)"], horizon: 2}',
-            "u* goes 0.7",
-        ),
-        ('{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0.06"], horizon: 4}', "up to 0.06"),
-        ("{kind: equilibrium, at: [0.5, 0], input: [0.5], horizon: 4}", ""),
-        ("{kind: equilibrium, at: [0.5, 0], input: [0.5]}", "lasts longer"),
-        ("{kind: equilibrium, at: [0.6, 0], input: [0.6], horizon: 1}", "u* goes 0.1"),
-    ],
-)
+@pytest.mark.parametrize(("plan", "words"), [
+    ('{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0"], horizon: 4}', ""),
+    ('{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0"], horizon: 5}', "lasts longer than the 4 s"),
+    ('{kind: expressions, x: ["1.1*sin(t)", "1.1*cos(t)"], u: ["0"], horizon: 4}', "p* goes 0.1 beyond"),
+    ('{kind: expressions, x: ["-1.1*sin(t)", "-1.1*cos(t)"], u: ["0"], horizon: 2}', "p* goes 0.1 beyond"),
+    ('{kind: expressions, x: ["0.4*sin(2*t)", "0.8*cos(2*t)"], u: ["-1.2*sin(2*t)"], horizon: 2}', "u* goes 0.7"),
+    ('{kind: expressions, x: ["0.9*sin(t)", "0.9*cos(t)"], u: ["0.06"], horizon: 4}', "up to 0.06"),
+    ("{kind: equilibrium, at: [0.5, 0], input: [0.5], horizon: 4}", ""),
+    ("{kind: equilibrium, at: [0.5, 0], input: [0.5]}", "lasts longer"),
+    ("{kind: equilibrium, at: [0.6, 0], input: [0.6], horizon: 1}", "u* goes 0.1"),
+])  # fmt: skip
 def test_expressions(plan, words):
     findings = member(plan)
     if words:

@@ -49,13 +49,8 @@ def test_other_radii_plan_once(tmp_path, monkeypatch):
     for epsilon in (".6", ".5"):
         end = answer(question_of(spec, radii(epsilon, ".1"), memory=memory))
         assert isinstance(end, Judged)
-    assert [memory.computed[name] for name in ("rank", "metric", "plan", "knots", "constants")] == [
-        1,
-        1,
-        1,
-        2,
-        2,
-    ]
+    names = "rank", "metric", "plan", "knots", "constants"
+    assert [memory.computed[name] for name in names] == [1, 1, 1, 2, 2]
 
 
 def set_in(text, *words):
@@ -81,14 +76,10 @@ def numbers(stage):
 OVER_THE_TUBE = ("radius", "constants", "geodesics")
 
 
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        ("adaptation.A_m=-1", "adaptation.A_m=-2"),
-        ("conditions.decides=A", "conditions.decides=B"),
-        ("limits.u=[-1, 1]", "limits.u=[-2, 1]"),
-    ],
-)
+@pytest.mark.parametrize(("one", "other"), [
+    ("adaptation.A_m=-1", "adaptation.A_m=-2"), ("conditions.decides=A", "conditions.decides=B"),
+    ("limits.u=[-1, 1]", "limits.u=[-2, 1]"),
+])  # fmt: skip
 @pytest.mark.slow
 def test_what_the_constants_do_not_rest_on_computes_none_again(one, other):
     memory = Memory()
@@ -100,16 +91,10 @@ def test_what_the_constants_do_not_rest_on_computes_none_again(one, other):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "words",
-    [
-        "uncertainty.h[0]=0.1*cos(t)",
-        "initial_state.at[0]=0.04",
-        "tube.rho_a=0.2",
-        "system.parameters.k=2",
-        "metric.rate=0.4",
-    ],
-)
+@pytest.mark.parametrize("words", [
+    "uncertainty.h[0]=0.1*cos(t)", "initial_state.at[0]=0.04", "tube.rho_a=0.2", "system.parameters.k=2",
+    "metric.rate=0.4",
+])  # fmt: skip
 def test_what_they_rest_on_computes_them_again(words):
     memory = Memory()
     for settings in ((), (words,)):
@@ -139,15 +124,10 @@ def test_other_knots_of_a_file_are_another_plan(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "change",
-    [
-        ("rate: 0.9999", "rate: 0.99"),
-        ("0.20365", "0.20366"),
-        ("x1: [-0.1, 0.1]", "x1: [-0.1, 0.11]"),
-        ("x1**2", "2*x1**2"),
-    ],
-)
+@pytest.mark.parametrize("change", [
+    ("rate: 0.9999", "rate: 0.99"), ("0.20365", "0.20366"), ("x1: [-0.1, 0.1]", "x1: [-0.1, 0.11]"),
+    ("x1**2", "2*x1**2"),
+])  # fmt: skip
 def test_another_system_metric_or_set_is_proven_anew(change):
     memory = Memory()
     text = THREE.source

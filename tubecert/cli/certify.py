@@ -56,7 +56,7 @@ def certify(
 ) -> ExitCode:
     """Prove the tube around the plan and find the smallest gains; always write the certificate."""
     from tubecert.library.stated import page_of
-    from tubecert.lint.plan import held
+    from tubecert.lint.plan import held, of_file
 
     metric = asked.get("metric")
     certificate.check_target(output)
@@ -77,7 +77,8 @@ def certify(
     new = _kept_metric(found, kept)
     for target in report:
         Report(certificate=found.certificate).save(target)
-    told = [("plan", item.message) for item in held(system)]
+    said = [*held(system), *([] if found.certified else of_file(system))]
+    told = [("plan", item.message) for item in said]
     written = [("certificate", output), *(("page", page) for page in report), *_next(found, system, output)]
     page = page_of(found.certificate, all_of_it=how.verbose)
     data = found.text if how.json or output == certificate.STDOUT else None

@@ -43,39 +43,31 @@ _GAP: Final = (
 )
 
 
-@asking.question(
-    {
-        "rho_a": asking.Exact(
-            "Radius left to the adaptation, a length over all states (overrides tube.rho_a).",
-            sets="tube.rho_a",
-            of=asking.METRIC,
-        ),
-        "epsilon": asking.Exact(
-            "Radius beyond the initial offset (overrides tube.epsilon; not beside half_widths).",
-            sets="tube.epsilon",
-            of=asking.METRIC,
-        ),
-        "metric": asking.Kind(METRIC_NAME.help, "FILE", sets="metric", of=asking.METRIC),
-        "conditions": asking.Choice(
-            "Which certificate decides the verdict: 0 (none: no adaptation), A (26: the paper's), B (distance), "
-            "or all of them; all are always computed.  [conditions.decides, or A]",
-            words=DECIDING,
-            of=asking.METRIC,
-        ),
-        "bandwidth": asking.Exact("Judge this filter bandwidth, in rad/s.", moderate=True, of=asking.METRIC),
-        "adaptation_rate": asking.Exact("... with this adaptation rate.", moderate=True, of=asking.METRIC),
-        "gap": asking.Exact(_GAP, "NUMBER|auto", below=1, word=AUTO, of=asking.METRIC),
-        "budget": BUDGET,
-        "deadline": replace(DEADLINE, ends=True),
-        "jobs": asking.Exact(
-            "Processes that share the boxes of a long search (none with hardware).",
-            whole=True,
-            of=asking.SEARCH,
-        ),
-        "scheduler": SCHEDULER,
-    },
-    PAIR,
-)
+@asking.question({
+    "rho_a": asking.Exact(
+        "Radius left to the adaptation, a length over all states (overrides tube.rho_a).",
+        sets="tube.rho_a", of=asking.METRIC,
+    ),
+    "epsilon": asking.Exact(
+        "Radius beyond the initial offset (overrides tube.epsilon; not beside half_widths).",
+        sets="tube.epsilon", of=asking.METRIC,
+    ),
+    "metric": asking.Kind(METRIC_NAME.help, "FILE", sets="metric", of=asking.METRIC),
+    "conditions": asking.Choice(
+        "Which certificate decides the verdict: 0 (none: no adaptation), A (26: the paper's), B (distance), "
+        "or all of them; all are always computed.  [conditions.decides, or A]",
+        words=DECIDING, of=asking.METRIC,
+    ),
+    "bandwidth": asking.Exact("Judge this filter bandwidth, in rad/s.", moderate=True, of=asking.METRIC),
+    "adaptation_rate": asking.Exact("... with this adaptation rate.", moderate=True, of=asking.METRIC),
+    "gap": asking.Exact(_GAP, "NUMBER|auto", below=1, word=AUTO, of=asking.METRIC),
+    "budget": BUDGET,
+    "deadline": replace(DEADLINE, ends=True),
+    "jobs": asking.Exact(
+        "Processes that share the boxes of a long search (none with hardware).", whole=True, of=asking.SEARCH
+    ),
+    "scheduler": SCHEDULER,
+}, PAIR)  # fmt: skip
 def certify(
     spec: Specifiable,
     *,

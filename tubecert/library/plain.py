@@ -21,16 +21,9 @@ Data: TypeAlias = Mapping[Any, Any]  # keys are texts, or symbols of sympy
 Plain: TypeAlias = "bool | str | list[Plain] | dict[str, Plain] | None"
 _DEEPEST: Final = 60  # the reader of specifications refuses less
 _VECTORS: Final = (  # keys for which a matrix with one column, or one row, stands for its entries
-    "system.f",
-    "uncertainty.h",
-    "trajectory.x",
-    "trajectory.u",
-    "trajectory.at",
-    "trajectory.input",
-    "trajectory.start",
-    "trajectory.target",
-    "initial_state.at",
-)
+    "system.f", "uncertainty.h", "trajectory.x", "trajectory.u", "trajectory.at", "trajectory.input",
+    "trajectory.start", "trajectory.target", "initial_state.at",
+)  # fmt: skip
 _ATOMS: Final = ("is_Symbol", "is_Rational", "is_Float")
 
 

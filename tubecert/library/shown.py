@@ -57,11 +57,8 @@ class Paged(Shown):
 
     __slots__ = ()
     forms: ClassVar[Mapping[str, str]] = {
-        ".html": "html",
-        ".htm": "html",
-        ".md": "markdown",
-        ".markdown": "markdown",
-    }
+        ".html": "html", ".htm": "html", ".md": "markdown", ".markdown": "markdown",
+    }  # fmt: skip
     known: ClassVar[str] = "a page is HTML or Markdown"
     remedy: ClassVar[str] = "give a file FILE.html or FILE.md in a folder that exists"
 

@@ -39,11 +39,8 @@ MEMBERS: Final = 20  # random plans of a family
 
 @asking.question({
     "controllers": asking.Names(
-        "Loops, separated by commas: nominal, ccm, reference, l1.  [ccm,l1]",
-        "NAMES",
-        words=("nominal", "ccm", "reference", "l1"),
-        what="controller",
-        of=asking.METRIC,
+        "Loops, separated by commas: nominal, ccm, reference, l1.  [ccm,l1]", "NAMES",
+        words=("nominal", "ccm", "reference", "l1"), what="controller", of=asking.METRIC,
     ),
     "gains": asking.Choice(
         "The certificate whose gains are taken.  [distance]", words=tuple(words_of(ADAPTIVE)), of=asking.METRIC
@@ -54,9 +51,7 @@ MEMBERS: Final = 20  # random plans of a family
     "seed": asking.Exact("Seed of the random runs and of the adversary.  [0]", whole=True, least=0),
     "replay": asking.Exact(
         "Draw this random run in place of the specification's h; not with hardware.",
-        whole=True,
-        least=0,
-        of=asking.METRIC,
+        whole=True, least=0, of=asking.METRIC,
     ),
     "members": asking.Exact(
         "Of a family without hardware: random plans that share the runs.  [20]", whole=True, of=asking.METRIC
@@ -174,14 +169,9 @@ def _setting(
 
 
 def _sampled(
-    found: SampledCertification,
-    system: Spec,
-    report: Progress | None,
-    *,
-    duration: Fraction | None,
-    runs: int | None,
-    seed: int | None,
-) -> SampledSimulation:
+    found: SampledCertification, system: Spec, report: Progress | None, *, duration: Fraction | None,
+    runs: int | None, seed: int | None,
+) -> SampledSimulation:  # fmt: skip
     """The same of a sampled loop."""
     from tubecert.certificate.belonging import as_set
     from tubecert.controller.compiled import stepper

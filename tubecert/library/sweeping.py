@@ -159,8 +159,7 @@ class Swept(Shown):
     "metric": METRIC_NAME,
     "conditions": asking.Choice(
         "Which certificate decides the verdict; all are always computed.  [conditions.decides, or A]",
-        words=DECIDING,
-        of=asking.METRIC,
+        words=DECIDING, of=asking.METRIC,
     ),
     "gap": asking.Exact("As for certify.", below=1, of=asking.METRIC),
     "budget": BUDGET,

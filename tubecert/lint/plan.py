@@ -53,9 +53,14 @@ def plan_findings(spec: Spec) -> list[Finding]:
     findings += _beyond_limits(spec, curve)
     if not outside and spec.trajectory.written:
         findings += _defect(spec, curve, build(spec))
-    if spec.trajectory.table is not None:  # exchanged columns leave the safe set, too
-        findings += table_findings(spec, spec.trajectory.table, build(spec), least_radius(spec))
+    findings += of_file(spec)  # exchanged columns leave the safe set, too
     return findings if spec.trajectory.bundle is not None else [*findings, *_obstacles(spec, curve)]
+
+
+def of_file(spec: Spec) -> list[Finding]:
+    """What is amiss with the plan of a file, against the dynamics; nothing of another plan."""
+    table = spec.trajectory.table
+    return [] if table is None else [*table_findings(spec, table, build(spec), least_radius(spec))]
 
 
 def curve_of(spec: Spec) -> Curve:

@@ -73,6 +73,8 @@ def _sections(
 
 
 def _meaning(result: Result) -> str:
+    if result.verdict is Verdict.REFUTED:
+        return "A tube contains its plan and must lie in the safe set: with this plan there is none."
     if result.verdict is not Verdict.CERTIFIED:
         return "This is neither proven nor refuted; it must not be relied on."
     return (

@@ -42,8 +42,7 @@ _LETTERS: Final = {name.key: name.letter for name in NAMES}
 
 def described(step: Step) -> str:
     """The whole first, which matters most where a line is cut: how much is done, the time, what is worked on."""
-    whole = [_done(step), _time(step)]
-    return "; ".join(part for part in (*whole, _now(step)) if part)
+    return "; ".join(filter(None, (_done(step), _time(step), _now(step))))
 
 
 def out_of_reach(size: Size) -> str:
@@ -114,8 +113,7 @@ def _name(step: Step) -> str:
     """What is worked on as reports call it: a constant by its words."""
     if step.phase is Phase.GAINS:
         return _LETTERS.get(step.name, step.name)
-    bounds_a_constant = step.phase in _OF_CONSTANTS and step.unit is Unit.BOXES
-    if not bounds_a_constant:
+    if step.phase not in _OF_CONSTANTS or step.unit is not Unit.BOXES:
         return step.name
     from tubecert.bounds.constants import EVERY  # with numerics, which are there where constants are bounded
 

@@ -38,10 +38,7 @@ _WHY: Final[Mapping[Missing, tuple[str, str]]] = {  # and what is added where it
     "inputs": ("the input {where} has too little room", ": beside the plan it needs {needed} of {allowed}"),
     "safe_set": ("the tube of {where} leaves the safe set", " by {needed}"),
     "start": ("the start of {where} is too far from the plan", ": {needed} of {allowed}"),
-    "plan": (
-        "the plan's own input {where} leaves its limits",
-        ": it goes to {needed}, the limit is {allowed}",
-    ),
+    "plan": ("the plan itself leaves {bounds}", ": {where} goes to {needed}, beyond {allowed}"),
     "obstacle": ("the tube is not proven to keep away from obstacle {where}", ""),
     "undefined": ("the equations are not proven to be defined in the tube: {where}", ""),
     "wish": ("the tube of {where} is wider than wished for", ": {needed} of {allowed}"),
@@ -60,7 +57,7 @@ _HELP: Final[Mapping[Missing, str]] = {
     "inputs": "wider limits, a plan that uses less of them, or less of what asks most: {largest}",
     "safe_set": "a larger safe_set, a plan farther from its sides, or less of what fills the tube",
     "start": "a nearer initial_state, or a larger wish or safe_set",
-    "plan": "wider limits, or a plan that keeps to them",
+    "plan": "wider limits or a larger safe_set, or a plan that keeps to them",
     "obstacle": "a plan that passes it farther away, or a wish in tube.half_widths for the states of its plane",
     "undefined": "a smaller safe_set that keeps away from there, or a narrower tube",
     "wish": "a larger wish, or less of what fills the tube most: {largest}",
@@ -82,11 +79,8 @@ def plan(result: Result) -> str:
 
 def misses(fitting: str) -> str:
     """That the plan does not solve its own equations, and what would."""
-    return (
-        f"it is no equilibrium: {fitting} is"
-        if fitting
-        else "it misses its own equations: tubecert check tells where by much"
-    )
+    moving = "it misses its own equations: tubecert check tells where by much"
+    return f"it is no equilibrium: {fitting} is" if fitting else moving
 
 
 def extent(result: Result) -> str:
@@ -115,7 +109,9 @@ def why(lack: Lack, effective: Effective) -> str:
     needed, allowed = (f"{up(number)} {unit}".rstrip() for number in (lack.needed, lack.allowed))
     sentence, more = (_ALONE if is_alone(effective) else _WHY).get(lack.kind, _WHY[lack.kind])
     text = sentence if lack.needed is None else sentence + more
-    return text.format(where=lack.where, needed=needed, allowed=allowed).removesuffix(": ")
+    told = {"where": lack.where, "needed": needed, "allowed": allowed}
+    bounds = "the safe set" if lack.where in effective.system.states else "its limits"
+    return text.format(**told, bounds=bounds).removesuffix(": ")
 
 
 def remedy(lack: Lack, effective: Effective, notes: Notes) -> str:
