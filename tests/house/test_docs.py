@@ -5,6 +5,7 @@ import re
 from functools import reduce
 from importlib import import_module
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 import pytest
@@ -29,6 +30,11 @@ MODULE = re.compile(r"`(tubecert(?:\.\w+)+)`")
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 ROWS = [line.split("|") for line in INDEX.splitlines() if line.startswith("| ") and "tubecert" in line]
 TAGS = {tag for row in ROWS for tag in re.findall(r"`([^`]+)`|\((\d\.\d+)\)", row[1]) for tag in tag if tag}
+
+
+def test_the_figure_of_a_sweep_has_the_looks_that_figures_have_now():
+    style = escape((PACKAGE / "report/templates/page.css").read_text("utf-8"))
+    assert style in (ROOT / "docs/figures/tradeoff_adaptation_rate.svg").read_text("utf-8")
 
 
 def tags_in(text):
