@@ -172,10 +172,11 @@ def test_where_nothing_acts_it_is_said_in_one_way():
 
 
 def test_ends_are_rounded_outward_and_not_beyond_the_limits():
-    """100.1 was said of an input that keeps to 100.01."""
-    range_ = Fraction("99.9912"), Fraction("100.0062")
-    assert ends(*range_, (Fraction(0), Fraction("100.01"))) == "99.991 to 100.01"
-    assert ends(*range_, (Fraction(0), Fraction(100))) == ends(*range_) == "99.99 to 100.1"
+    """99.99 to 100.1 was said of an input that keeps to 100.01, and moves by less than a tenth of that."""
+    assert ends(Fraction("99.9912"), Fraction("100.0062")) == "99.9912 to 100.007"
+    assert ends(Fraction("-5.0001"), Fraction("2.00011")) == "-5.001 to 2.001"
+    limits = Fraction(-6), Fraction("2.0005")
+    assert ends(Fraction("-5.0001"), Fraction("2.00011"), limits) == "-5.0001 to 2.0002"
 
 
 def test_degrees_are_shown_as_degrees():

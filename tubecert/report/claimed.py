@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from tubecert.certificate.result import Result
     from tubecert.enclosure.constant import Witness
 
+_WIDER = 1.1  # times as wide as it is a range may be shown
 NOT_RECHECKED = (
     "Not rechecked: this is what the certificate says; whether it is true, tubecert recheck examines."
 )
@@ -88,11 +90,14 @@ def size(bound: Fraction) -> str:
 
 
 def ends(low: Fraction | float, high: Fraction | float, limits: Sequence[Fraction] | None = None) -> str:
-    """Ends of a range, rounded outward, but not beyond limits that it keeps to; where rounding is all, as they are."""
+    """Ends of a range, rounded outward; where rounding is all, as they are.
+
+    There are so many digits that it is hardly wider than it is, and not beyond limits that it keeps to.
+    """
     rounded = [(down(low, digits), up(high, digits)) for digits in range(4, 18)]
-    least, most = limits or (1, 0)  # which nothing keeps to
-    within = ((a, b) for a, b in rounded if least <= Fraction(a) and Fraction(b) <= most)
-    outward = next(within, rounded[0])
+    least, most = limits or (-math.inf, math.inf)
+    near = ((a, b) for a, b in rounded if Fraction(b) - Fraction(a) <= _WIDER * float(high - low))
+    outward = next(((a, b) for a, b in near if least <= Fraction(a) and Fraction(b) <= most), rounded[0])
     plain = [short(round(Fraction(q), 12)) for q in [low, high]]
     missed = max(abs(float(Fraction(plain[0]) - low)), abs(float(Fraction(plain[1]) - high)))
     if missed == 0 or missed > NOTHING:

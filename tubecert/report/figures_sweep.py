@@ -146,12 +146,8 @@ def _map(table: SweepTable, quantity: Quantity) -> Chart:
     space = np.geomspace if _is_wide(values) else np.linspace
     steps = space(min(values), max(values), _HEAT + 1)
     key = f"sweep-{quantity.key.replace('.', '-')}"
-    chart = _plane(
-        table,
-        key,
-        quantity.words,
-        "A colour stands for a range of values; a pointer that rests on a cell shows its own.",
-    )
+    caption = "A colour stands for a range of values; a pointer that rests on a cell shows its own."
+    chart = _plane(table, key, quantity.words, caption)
     cells = [(value, cell) for cell in _cells(table) if (value := _value(cell[0], quantity)) is not None]
     for value, (_, low, high) in sorted(cells, key=lambda each: each[0]):
         step = min(int(np.searchsorted(steps, value, side="right")) - 1, _HEAT - 1)
