@@ -34,12 +34,10 @@ ELSEWHERE = {
     "docs/howto/plan.md": "test_howto.py",
     "docs/architecture.md": "test_architecture_page.py: rooms, their sizes, who is trusted",
     "docs/reference/codes.md": "tests/spec/test_schema.py, tests/cli/test_everyday.py: fragments of `explain`",
-    **{
-        path.relative_to(
-            ROOT
-        ).as_posix(): "formulas; test_docs.py numbers them, the tests of their rooms evaluate them"
-        for path in (ROOT / "docs" / "theory").glob("*.md")
-    },
+    **dict.fromkeys(
+        (path.relative_to(ROOT).as_posix() for path in (ROOT / "docs" / "theory").glob("*.md")),
+        "formulas; test_docs.py numbers them, the tests of their rooms evaluate them",
+    ),
 }
 
 # commands that are read but not run, by how they begin: why
@@ -94,16 +92,13 @@ PLANT = linear("p, v", "u")
 BASES = {
     "docs/families.md": [linear("p, v", "force")],
     "docs/language.md": [
-        PLANT,
-        linear("x, v", "u"),
-        linear("phi, v", "u"),
-        linear("p, v, q, w", "thrust, torque"),
+        PLANT, linear("x, v", "u"), linear("phi, v", "u"), linear("p, v, q, w", "thrust, torque"),
     ],
     "docs/limits.md": [linear("p, v, q, w", "F, tau")],
     "docs/simulate.md": [linear("x1, x2", "u")],
     "docs/sweep.md": [linear("p, v", "u", h="0.01*m*sin(t)").replace("f:", "parameters: {m: 1}, f:")],
     "docs/tubes.md": [linear("q, w", "torque")],
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

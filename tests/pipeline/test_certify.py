@@ -91,22 +91,13 @@ def test_gains_of_the_reference_rows():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("text", "largest"),
-    [
-        (replaced(with_metric(THREE, PRINTED_THREE), ("rate: 0.9999", "rate: 1")), "0.99653"),
-        (replaced(THREE, ("rate: 0.9999", "rate: 1")), "0.99999"),
-        (
-            replaced(
-                ORBIT, ('"4.25828", "-0.93423"', "4.26, -0.93"), ('"-0.93423", "3.76692"', "-0.93, 3.77")
-            ),
-            "1.73933",
-        ),
-    ],
-    ids=["three-state as printed", "three-state at rate 1", "two-state as printed"],
-)
-def test_false_metrics_are_refuted_with_a_point_and_the_largest_rate(text, largest):
-    result = run(text)
+@pytest.mark.parametrize(("text", "changes", "largest"), [
+    (with_metric(THREE, PRINTED_THREE), [("rate: 0.9999", "rate: 1")], "0.99653"),
+    (THREE, [("rate: 0.9999", "rate: 1")], "0.99999"),
+    (ORBIT, [('"4.25828", "-0.93423"', "4.26, -0.93"), ('"-0.93423", "3.76692"', "-0.93, 3.77")], "1.73933"),
+], ids=["three-state as printed", "three-state at rate 1", "two-state as printed"])  # fmt: skip
+def test_false_metrics_are_refuted_with_a_point_and_the_largest_rate(text, changes, largest):
+    result = run(replaced(text, *changes))
     assert result["verdict"] == "refuted"
     assert Verdict(result["verdict"]).exit_code == 1
     (reason,) = result["reasons"]
@@ -291,26 +282,18 @@ def test_any_start_within_a_radius_costs_more_than_the_nearest_and_no_more_than_
     assert around["spec"]["effective"]["initial_state"] == {"within": "0.01732050808"}
     assert around["tube"]["rho"] == pytest.approx(three["tube"]["rho"], rel=1e-6)
     d0, point = around["constants"]["initial_distance"], three["constants"]["initial_distance"]
-    assert (
-        point["above"]
-        <= d0["above"]
-        == pytest.approx(0.01732050808 * around["metric"]["upper"][1] ** 0.5, rel=1e-6)
-    )
+    length = 0.01732050808 * around["metric"]["upper"][1] ** 0.5
+    assert point["above"] <= d0["above"] == pytest.approx(length, rel=1e-6)
     assert around["conditions_26"]["bandwidth"] > three["conditions_26"]["bandwidth"]  # E0 is larger
 
 
 @pytest.mark.slow
 def test_a_start_within_a_radius_bounds_the_uncertainty_over_all_starts():
-    text = replaced(
-        THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + x1"), ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01}")
-    )
-    result = run(text, conditions="distance")
-    assert (
-        result["constants"]["h_initial"]["below"]
-        <= 0.01
-        <= result["constants"]["h_initial"]["above"] * (1 + 1e-9)
-    )
-    assert result["constants"]["h_initial"]["above"] <= 0.0101
+    within = ("{at: [0.01, -0.01, 0.01]}", "{within: 0.01}")
+    text = replaced(THREE, ("0.1*sin(2*t)", "0.1*sin(2*t) + x1"), within)
+    found = run(text, conditions="distance")["constants"]["h_initial"]
+    assert found["below"] <= 0.01 <= found["above"] * (1 + 1e-9)
+    assert found["above"] <= 0.0101
 
 
 @pytest.mark.slow
