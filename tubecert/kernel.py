@@ -177,7 +177,9 @@ def judge(problem: TubeProblem, theorem: Theorem[R], proposal: Proposal[R]) -> J
     checked = {role: check(problem, recipe) for role, recipe in proposal.beside.items()}
     return replace(
         decided,
-        ultimate_radius=None if decided.decisive is None else _ultimate(problem, decided.decisive, proposal),
+        ultimate_radius=None
+        if provisos or decided.decisive is None
+        else _ultimate(problem, decided.decisive, proposal),
         beside={role: each for role, each in checked.items() if _holds(each.margins)},
         curve=_holding(problem, proposal.curve),
         around_at=proposal.around,

@@ -18,6 +18,7 @@ EDGE = {  # where data comes in or goes out, and what it is
     "certificate/effective.py": "the canonical data that a certificate holds, and typed views of it",
     "certificate/belonging.py": "canonical data of a file against that of a certificate, key by key",
     "sampled_loop/record.py": "records of a certificate of a sampled loop as JSON, sealed and read back",
+    "synthesis/coefficients.py": "metrics as other tools keep them as the text of a metric file",
     "report/pages.py": "the TOML of the pages",
     "report/sarif.py": "the JSON of a foreign format",
 }

@@ -133,9 +133,9 @@ def test_certify_answers_for_hardware_and_refuses_what_is_about_metrics(monkeypa
 def test_a_plan_that_leaves_the_safe_set_is_refuted_for_that(monkeypatch, plan, told):
     """That no tube closes was said, or that an input has too little room."""
     lacking = sampled.undecided(Lack(kind="no_fixed_point", where="v"))
-    monkeypatch.setattr(certification, "certify", lambda spec, report: lacking)
+    monkeypatch.setattr(certification, "_answer", lambda *_: (lacking.result, lacking.notes))
     found = tc.certify(tc.specification(sampled.SPEC.replace(sampled.POINT, plan)))
-    assert (found.verdict, len(found.reasons)) == ("refuted" if told else "undecided", 1)
+    assert found.verdict == ("refuted" if told else "undecided")
     assert (f"the plan itself leaves the safe set: {told}" == found.reasons[0].message) == bool(told)
     assert ("neither proven nor refuted" in tc.report(found).markdown) != bool(told)
 

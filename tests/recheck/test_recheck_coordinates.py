@@ -19,7 +19,7 @@ from systems import SMALL
 from tubecert.errors import TubecertError
 from tubecert.expression import number_text
 from tubecert.recheck.coordinates import Coordinates, inverted
-from tubecert.recheck.tube import Ellipsoid
+from tubecert.recheck.tube import Ellipsoid, Round
 
 # W = [[1, -0.3], [-0.3, 1.3]] and S W S' = I: a = A = 1, so that no entry of S may move; x = z1, y = 1.1 z2 - 0.3 z1
 S = [["1", "0"], ["3/11", "10/11"]]
@@ -248,3 +248,17 @@ def test_a_box_beside_the_ellipsoid_is_cut_off():
     assert tube.near([0, 1], [(0.6, 0.7), (-0.7, -0.6)]) is not None
     assert tube.near([1], [(1.5, 1.6)]) is None  # y reaches the square root of 2
     assert tube.near([1], [(1.35, 1.6)]) is not None
+
+
+@pytest.mark.parametrize("size", [Fraction(1, 10**100), Fraction(10**100)])
+def test_a_tube_of_which_floats_may_lose_points_is_refused(size):
+    own = Coordinates(((Fraction(1),),))
+    for make in (
+        lambda: Round(size),
+        lambda: Ellipsoid(own, size, (Fraction(1),)),
+        lambda: Ellipsoid(own, Fraction(1), (size,)),
+    ):
+        with pytest.raises(ValueError, match="for floats"):
+            make()
+    with pytest.raises(ValueError, match="for floats"):
+        Ellipsoid(Coordinates(((size,),)), Fraction(1), (Fraction(1),)).near([0], [(0.0, 1.0)])

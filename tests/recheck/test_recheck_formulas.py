@@ -168,6 +168,15 @@ def test_any_numbers_of_theorems_0_and_b_are_those_of_the_theory(omega):
     assert len(followed) == 2
 
 
+def test_sizes_of_theorem_b_are_not_negative():
+    """With a negative Y and e it would ask for less than nothing where B^+ is said to turn fast (an upper bound)."""
+    for problem in problems():
+        setting, gains = reading(problem), gains_of(at(problem, "B", OMEGAS[0]))
+        turning = replace(setting, n=replace(setting.n, B_pinv_x=arb(10) ** 15))
+        proof = DistanceProof(speed=arb(-1), prediction_error=arb(-(10**6)), uncertainty=arb(10) ** 3)
+        assert distance_bound(turning, gains, proof) is None
+
+
 @pytest.fixture
 def precise():
     with ctx.workprec(BITS), mpmath.workdps(oracle.DIGITS):

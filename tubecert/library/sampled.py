@@ -1,39 +1,31 @@
 """Certification of a sampled loop from code: its certificate as a value, and its controller, sample by sample.
 
-In: a specification with `hardware`, or a certificate. Out: views of what the certificate says; nothing is decided here
-but that the plan itself leaves the safe set, by enclosures of its points that are rounded outward.
+In: a specification with `hardware`, or a certificate. Out: views of what the certificate says; nothing is decided here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from tubecert.controller.data import data_of
 from tubecert.controller.recursion import SampledController
-from tubecert.enclosure.interval import Array, fraction_bounds
+from tubecert.enclosure.interval import Array
 from tubecert.library.certifying import ran
 from tubecert.library.specification import Specification
 from tubecert.library.stated import Stated, array, rounded, rounded_up
-from tubecert.model import build
 from tubecert.progress import Phase, Progress, Step
 from tubecert.report.figures_axes import Chart
 from tubecert.report.figures_sampled import band, plane_figure, state_figures
 from tubecert.report.page import Reason
-from tubecert.sampled_loop.record import Certificate, Lack, Notes, Result, Shares, certificate_text, seal
-from tubecert.spec import Knots, Spec
-from tubecert.trajectory.make import plan_of
-from tubecert.verdict import Verdict
+from tubecert.sampled_loop.record import Certificate, Result, Shares, certificate_text
+from tubecert.spec import Spec
 from tubecert.words.sampled_loop import assumed, lacking
 
 if TYPE_CHECKING:
     from tubecert.certificate.belonging import Belonging  # loads rooms that a sampled loop does not use
-
-_TIMES: Final = 257  # of a plan, beside its knots, at which it is looked at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,26 +117,7 @@ def certified(spec: Spec, progress: Progress | None) -> SampledCertification:
     run = ran("tubecert.certify")
     if progress is not None:
         progress(Step(phase=Phase.LOOP))
-    found = certify(spec, progress)
-    if left := tuple(_left(spec, found.result.planned)):
-        own, verdict = found.result, Verdict.REFUTED
-        told = Result(verdict=verdict, spec=own.spec, claim=own.claim, planned=own.planned, lacks=left)
-        found = seal(told, Notes(), {})
-    return certification_of(replace(found, run=run()), Specification(spec=spec))
-
-
-def _left(spec: Spec, knots: Knots | None) -> Iterator[Lack]:
-    """Where the plan itself is proven to leave the safe set, in which every tube must lie; nothing of a family."""
-    plan = plan_of(spec, build(spec), knots)
-    last = 0.0 if plan.horizon is None else fraction_bounds(plan.horizon)[0]
-    known = () if plan.knots is None else map(float, plan.knots.t)
-    t = np.minimum([*np.linspace(0.0, last, _TIMES), *known], last)
-    x = plan.enclose(t, t)[0]
-    most = x.hi.min(axis=0), x.lo.max(axis=0)  # it goes as far, or farther; all of a family does
-    for name, low, high, (least, limit) in zip(spec.states, *most, spec.safe_set, strict=True):
-        if low < least or high > limit:
-            goes, end = (low, least) if low < least else (high, limit)
-            yield Lack(kind="plan", where=name, needed=float(goes), allowed=float(end))
+    return certification_of(replace(certify(spec, progress), run=run()), Specification(spec=spec))
 
 
 def certification_of(certificate: Certificate, given: Specification | None = None) -> SampledCertification:

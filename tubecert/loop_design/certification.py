@@ -29,7 +29,7 @@ from tubecert.progress import Phase, Progress, Step, Unit
 from tubecert.sampled_loop.record import Certificate, Claim, Lack, Notes, Result, Source, Tables, seal
 from tubecert.sampled_loop.remainders import Remainders
 from tubecert.sampled_loop.setting import Loop
-from tubecert.sampled_loop.theorem import check, undefined
+from tubecert.sampled_loop.theorem import check, refuted, undefined
 from tubecert.spec import Knots, Spec, canonical
 from tubecert.trajectory.make import Room, plan_of
 from tubecert.verdict import Verdict
@@ -45,6 +45,8 @@ def certify(spec: Spec, report: Progress | None = None) -> Certificate:
     Raises `SpecError` for what makes the question meaningless.
     """
     remainders = ask(spec, report)
+    if left := refuted(remainders.loop):
+        return seal(replace(_result(remainders.loop), **left._asdict()), Notes(), {})
     if hopeless := tuple(_hopeless(remainders)):
         return seal(replace(_result(remainders.loop), lacks=hopeless), Notes(), {})
     return seal(*_answer(remainders, report), {})

@@ -212,11 +212,9 @@ def _leaves(told: _Told, radius: Fraction, least: Fraction) -> Outcome:
     name, above = told.word("state", *s.states), told.word("side", "lower", "upper") == "upper"
     i, (low, high), t = s.states.index(name), s.safe_set[name], told.moment
     sign, limit = (1, high) if above else (-1, -low)
-    if isinstance(family, AnyPlan):  # some plan of it is at each face of its box
-        x = [exact((a + b) / 2) for a, b in family.x.values()]
-        x[i] = exact(family.x[name][above])
-    else:
-        x, _ = told.case.curve.at(t)
+    if isinstance(family, AnyPlan):
+        return Outcome(verdict="undecided", why="whether a plan of the family is there is not known")
+    x, _ = told.case.curve.at(t)
     beyond = sign * x[i] - exact(limit)
     if not beyond + exact(least) > 0:
         return _if(False)

@@ -31,6 +31,14 @@ _LESS, _MORE = 1 - 1e-14, 1 + 1e-14
 _SLACK = 4e-14  # relative to the sum of magnitudes: sums of at most 64 terms
 _INNER = 1 - 1e-9
 _TINY = 1e-280
+_FAR = 1e80  # from 1 in either direction: within it no square, product or quotient of these leaves the range of floats
+
+
+def _square(rho: Fraction, *others: Fraction) -> float:
+    """rho^2 from above; raises `ValueError` where floats might lose points of the tube."""
+    if not all(1 / _FAR <= q <= _FAR for q in (rho, *others)):
+        raise ValueError("the tube is too wide or too narrow for floats")
+    return math.nextafter(float(rho * rho), math.inf)
 
 
 class Round:
@@ -38,7 +46,7 @@ class Round:
 
     def __init__(self, rho: Fraction) -> None:
         self._rho = exact(rho)
-        self._square = math.nextafter(float(rho * rho), math.inf)
+        self._square = _square(rho)
 
     def extent(self, state: int) -> float:
         """The radius."""
@@ -94,7 +102,7 @@ class Ellipsoid:
 
     def __init__(self, coordinates: Coordinates, rho: Fraction, sides: Numbers) -> None:
         self._spread, self._rho, self._sides = coordinates.spread, rho, sides
-        self._square = math.nextafter(float(rho * rho), math.inf)
+        self._square = _square(rho, *sides)
         self._forms: dict[tuple[int, ...], _Form] = {}
         whole = [ceiling(exact(rho) * root(exact(row[i]))) for i, row in enumerate(self._spread)]
         self._extents = [min(reach, ceiling(exact(side))) for reach, side in zip(whole, sides, strict=True)]
@@ -167,6 +175,7 @@ class _Form:
             for i in range(len(block))
         ]
         self._weights, self._rows = _squares(Q)
+        _square(*self._weights)
         self._least = [math.nextafter(float(d), 0.0) for d in self._weights]
         self._floats = [[float(l) for l in row] for row in self._rows]
         n = range(len(which))

@@ -164,12 +164,13 @@ Missing = Literal[
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lack:
-    """Why nothing is certified: what kind of thing, where (a state, an input or a mode), and how much of what."""
+    """Why nothing is certified: what kind of thing, where (a state, input or mode), how much of what, and when in s."""
 
     kind: Missing
     where: str = ""
     needed: float | None = None
     allowed: float | None = None
+    at: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -37,6 +37,7 @@ from tubecert.verdict import Verdict
 
 MOST_LAGS: Final = 50_000
 MOST_PARTS: Final = 64
+_TIMES: Final = 257  # of a plan at which it is looked at, beside its knots
 _CAREFUL: Final = Effort(budget=200_000)
 _FLUSHED: Final = 1e-35  # lost without subnormal numbers, in z + n <= 400 products and sums
 _DIGITS: Final = 7
@@ -208,6 +209,25 @@ class Checked(NamedTuple):
     inputs: tuple[InputUse, ...] = ()
     clearance: tuple[Cleared, ...] = ()
     lacks: tuple[Lack, ...] = ()
+
+
+def refuted(loop: Loop) -> Checked | None:
+    """Where the plan leaves the safe set, in which its tube must lie, at a time that is looked at; None if nowhere."""
+    plan = loop.plan
+    if isinstance(plan, Family):
+        return None
+    last = 0.0 if plan.horizon is None else fraction_bounds(plan.horizon)[0]
+    knots = () if loop.knots is None else map(float, loop.knots.t)
+    t = np.minimum([*np.linspace(0.0, last, _TIMES), *knots], last)
+    x, lacks = plan.enclose(t, t)[0], []
+    for name, lo, hi, (least, most) in zip(
+        loop.model.states, x.lo.T, x.hi.T, loop.spec.safe_set, strict=True
+    ):
+        k, j = np.argmin(hi), np.argmax(lo)
+        goes, end, at = (hi[k], least, t[k]) if float(hi[k]) < least else (lo[j], most, t[j])
+        if float(hi[k]) < least or float(lo[j]) > most:
+            lacks.append(Lack(kind="plan", where=name, needed=float(goes), allowed=float(end), at=float(at)))
+    return Checked(verdict=Verdict.REFUTED, lacks=tuple(lacks)) if lacks else None
 
 
 def check(loop: Loop, controller: Tables, stages: Sequence[Stage], recipe: Recipe) -> Checked:

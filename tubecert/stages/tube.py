@@ -206,8 +206,9 @@ def _radii(
 def _leaving(planned: Planned, radius: Radius) -> Stopped:
     """What is claimed of a tube that is not proven to lie in the safe set, and what would fit."""
     contained = radius.contained
-    # in coordinates of its own a tube is bounds of what it reaches, and one of many: that it leaves refutes nothing
-    refutes = radius.sides is None or contained.outside
+    # in coordinates of its own a tube is bounds of what it reaches, and one of many: that it leaves refutes nothing;
+    # nor that a family's box leaves: whether a plan of it is there is not known
+    refutes = planned.question.spec.trajectory.bundle is None and (radius.sides is None or contained.outside)
     return stopped(
         planned,
         _claim(radius),

@@ -1,9 +1,15 @@
 """The form of a certificate of a sampled loop: what is missing, unknown or of another kind is refused, with a code."""
 
 import copy
+import json
 
 import pytest
-from sampled_files import CART, SCALAR, changed, code_of, made, resealed
+from sampled_files import CART, FAMILY, SCALAR, changed, code_of, made, resealed, why_not
+from small_loops import text_of
+
+from tubecert.loop_design.certification import certify
+from tubecert.sampled_loop.record import certificate_text
+from tubecert.spec import load_text
 
 pytestmark = pytest.mark.slow
 SOMETIMES = {"settings", "lacks", "clearance", "inputs", "limits", "planned"}
@@ -101,3 +107,28 @@ def test_other_formats_are_told_apart():
         ("tubecert-certificate/3", "TC603"),
     ):
         assert code_of({**document, "format": format_}) == code
+
+
+def test_a_sampled_loop_is_refuted_by_where_its_plan_is_and_by_nothing_else():
+    plan = "{kind: expressions, x: ['9*sin(t)'], u: ['9*cos(t)'], horizon: 2}"
+    document = json.loads(
+        certificate_text(certify(load_text(text_of(trajectory=plan, safe_set="{x: [-7, 7]}"))))
+    )
+    assert (document["result"]["verdict"], why_not(document)) == ("refuted", [])
+    (lack,) = document["result"]["lacks"]
+    for key, to in (
+        ("where", "u"),
+        ("needed", 8.9),
+        ("allowed", 6.0),
+        ("at", 0.1),
+        ("at", 2.1),
+        ("kind", "start"),
+    ):
+        assert lack[key] != to
+        assert why_not(changed(document, "lacks", 0, key, to=to))
+    assert why_not(changed(document, "lacks", to=[]))
+    for lie in (made(SCALAR), made(FAMILY)):
+        del lie["result"]["controller"]
+        assert why_not(
+            changed({**lie, "result": {**lie["result"], "lacks": [lack]}}, "verdict", to="refuted")
+        )

@@ -154,6 +154,19 @@ def test_a_range_holds_on_both_sides(ends):
 
 
 @pytest.mark.slow
+def test_a_part_of_no_length_in_floats_has_a_window():
+    t = (
+        Fraction(0),
+        Fraction(1, 2),
+        *(Fraction(1, 2) + k * Fraction(1, 10**330) for k in (1, 2)),
+        Fraction(1),
+    )
+    u = ((Fraction(0),), (Fraction(0),), (Fraction(9),), (Fraction(0),), (Fraction(0),))
+    knots = Knots(t, ((Fraction(0),),) * 5, u, "linear")
+    own = course_of(asked(trajectory="{kind: ilqr, target: [0], horizon: 1}"), planned(asked(), knots))
+    assert max(float(window.u[0].abs_upper()) for window in own.windows(8)) >= 9
+
+
 def test_h_is_defined_on_all_of_the_safe_set():
     h = ["0.2*sin(t) + 0.0000001*log(p + 5)"]
     assert why_not(changed(made(CART), "spec", "effective", "uncertainty", "h", to=h))

@@ -29,16 +29,22 @@ from tubecert.recheck.times import time_range
 _ROUNDING = {"single": Fraction(1, 2**24), "double": Fraction(1, 2**53)}
 _FLUSHED = Fraction(1, 10**35)  # what a computer loses that has no subnormal numbers
 _SECOND = 1 + Fraction(1, 2**20)  # rounding of what is a rounding already
+_SHOWN = Fraction(1, 10**9)  # how far what is told of a plan may be off, on the scale of the safe set
 ROWS = 53  # bits, in which rows are carried
 
 
 def of(result: Result, budget: int) -> Iterator[Claim]:
-    """Every claim; of a result that is not certified, only that it is for this specification."""
+    """Every claim; of a result that is not certified, that it is for this specification, and what refutes it."""
     spec, proven = result.specification, result.proven
     repeated = {**result.repeated, **(proven.repeated if proven else {})}
     wrong = ", ".join(path for path, (given, own) in repeated.items() if given != own)
     why = f"not what the specification has: {wrong}"
     yield Claim("the specification and what repeats it", None, lambda: stated(not wrong, why))
+    if result.plan is not None:
+        course = course_of(spec, result.plan)
+        for i, *told in result.outside:
+            name = f"the plan itself leaves the safe set in {spec.plant.states[i]}"
+            yield Claim(name, None, partial(_outside, course, i, *told))
     if proven is None:
         return
     case = Case(spec, proven, budget)
@@ -223,6 +229,18 @@ class Case:
         starts = [own.start * self._spec.hardware.sample_time for own in self._proven.stages]
         met = self._proven.stages[bisect_right(starts, max(0.0, begin)) - 1 : bisect_right(starts, end)]
         return [max(own) for own in zip(*(own.half_widths for own in met), strict=True)]
+
+
+def _outside(course: Course, i: int, at: Fraction, goes: Fraction, end: Fraction) -> Outcome:
+    """At a time of the plan a state of it is as far out as is told, beyond an end of its range."""
+    ends, horizon = list(course.spec.plant.safe_set.values())[i], course.spec.trajectory.horizon
+    if not 0 <= at <= (at if horizon is None else horizon) or float(end) not in map(float, ends):
+        return stated(False, "that is no time of the plan, or no end of the safe set")
+    x = course.curve.at(at)[0][i]
+    near = bool(abs(x - exact(goes)) <= exact(_SHOWN) * (abs(x) + exact(ends[1] - ends[0])))
+    above = float(end) == float(ends[1])
+    beyond = bool(x > exact(ends[1])) if above else bool(x < exact(ends[0]))
+    return stated(near and beyond, f"it is at {float(x.mid()):.9g} then")
 
 
 def _within(ends: Range, planned: Iterable[Ball], more: Ball) -> Outcome:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import dataclass
+from fractions import Fraction
 
 from flint import arb_mat
 
@@ -73,11 +74,16 @@ class Proven:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What is claimed, and `proven` where it is certified; `unread`: members that no claim examines."""
+    """What is claimed, and `proven` where it is certified; `unread`: members that no claim examines.
+
+    What refutes it is that the `plan` is `outside` of the safe set: which state, when, how far, and beyond which end.
+    """
 
     verdict: str
     specification: SampledSpecification
     proven: Proven | None
+    plan: Plan | None
+    outside: list[tuple[int, Fraction, Fraction, Fraction]]
     repeated: Repeated
     unread: tuple[str, ...]
 
@@ -85,7 +91,8 @@ class Result:
 def read_result(node: Node) -> Result:
     """`result` of a certificate; raises `CertificateError` for whatever is not of its form."""
     own = node.closed("verdict", "spec", "claim", optional=_PARTS)
-    certified = own["verdict"].word("certified", "refuted", "undecided") == "certified"
+    verdict = own["verdict"].word("certified", "refuted", "undecided")
+    certified, refuted = verdict == "certified", verdict == "refuted"
     if certified and "lacks" in own:
         raise own["lacks"].refused("is there, and yet the verdict is certified")
     source = own["spec"].closed("effective", "effective_hash", "file_hash", optional=("settings",))
@@ -101,13 +108,29 @@ def read_result(node: Node) -> Result:
         "claim.afterwards": (claim["afterwards"].text(), spec.afterwards),
         "claim.hold": (claim["hold"].text(), spec.hardware.hold),
     }
+    examined = _PARTS if certified else ("lacks", "planned") if refuted else ()
     return Result(
-        verdict=own["verdict"].text(),
+        verdict=verdict,
         specification=spec,
         proven=_proven(own, spec) if certified else None,
+        plan=_plan(own, spec) if refuted else None,
+        outside=_outside(own["lacks"], spec) if refuted else [],
         repeated=repeated,
-        unread=("spec.file_hash", *(key for key in _PARTS if key in own and not certified)),
+        unread=("spec.file_hash", *(key for key in _PARTS if key in own and key not in examined)),
     )
+
+
+def _outside(lacks: Node, spec: SampledSpecification) -> list[tuple[int, Fraction, Fraction, Fraction]]:
+    """Where the plan is outside of the safe set: the one thing that refutes a sampled loop, and no family's."""
+    found, states = [], list(spec.plant.states)
+    for item in lacks.entries():
+        own = item.closed("kind", "where", "needed", "allowed", "at")
+        own["kind"].word("plan")
+        place = states.index(own["where"].word(*states))
+        found.append((place, own["at"].number(), own["needed"].number(), own["allowed"].number()))
+    if not found or spec.trajectory.kind == "any":
+        raise lacks.refused("does not refute it")
+    return found
 
 
 def _proven(own: Members, spec: SampledSpecification) -> Proven:

@@ -134,7 +134,7 @@ class Course:
         whole = sum((float(part.length.mid()) for part in curve.parts), start=0.0)
         timed = self.horizon is not None and curve.moves
         for part in curve.parts:
-            pieces = ceil(count * float(part.length.mid()) / whole) if curve.moves and whole else 1
+            pieces = max(1, ceil(count * float(part.length.mid()) / whole)) if curve.moves and whole else 1
             own, length = field.with_values(part.values), ceiling(part.length)
             for lo, hi in pairwise([*(length * k / pieces for k in range(pieces)), length]):
                 found = iter(own.hull([(lo, hi)] if own.variables else []))
