@@ -91,17 +91,14 @@ def _obstacles(axis: Axes, spec: Spec, names: tuple[str, str]) -> None:
     from matplotlib.patches import Circle, Patch, Polygon
 
     label: str | None = "obstacle"
-    for obstacle in spec.obstacles:
-        if set(obstacle.states) != set(names):
-            continue
-        turned = obstacle.states != names
+    for obstacle in (each for each in spec.obstacles if set(each.states) == set(names)):
+        order = [obstacle.states.index(name) for name in names]
         patch: Patch
-        if obstacle.radius is not None:
-            center = [float(value) for value in obstacle.center]
-            patch = Circle((center[::-1] if turned else center), float(obstacle.radius))  # type: ignore[arg-type]
+        if obstacle.radius is None:
+            patch = Polygon(corners_of(obstacle)[:, order], closed=True)
         else:
-            corners = corners_of(obstacle)
-            patch = Polygon(corners[:, ::-1] if turned else corners, closed=True)
+            x, y = (float(obstacle.center[i]) for i in order)
+            patch = Circle((x, y), float(obstacle.radius))
         patch.set(facecolor="#BDBDBD", edgecolor="#6E6E6E", zorder=2, label=label)
         axis.add_patch(patch)
         label = None

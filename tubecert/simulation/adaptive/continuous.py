@@ -122,11 +122,8 @@ class Acting:
 
 def reason(stopped: int, limit: float) -> str:
     """Why a lane was stopped."""
-    own = {
-        INFEASIBLE: "no input makes the metric contract here",
-        DIVERGED: f"the state diverges from the plan: |x - x*| exceeds {near(limit, 4)}",
-    }
-    return {**REASONS, **own}[stopped]
+    far = f"the state diverges from the plan: |x - x*| exceeds {near(limit, 4)}"
+    return {**REASONS, INFEASIBLE: "no input makes the metric contract here", DIVERGED: far}[stopped]
 
 
 class Continuous:

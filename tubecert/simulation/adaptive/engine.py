@@ -55,11 +55,8 @@ class Vector:
         self._plans = {id(problem.plan): problem.plan for problem, *_ in batches}
         loops = [(loop.adapts, loop.gains if loop.filters else None) for _, loop, _ in batches]
         self._loops, places = [*dict.fromkeys(loops)], [*self._plans]
-        self.lanes = lanes_of(
-            batches,
-            [*map(self._loops.index, loops)],
-            [places.index(id(problem.plan)) for problem, *_ in batches],
-        )
+        numbers = [places.index(id(problem.plan)) for problem, *_ in batches]
+        self.lanes = lanes_of(batches, [*map(self._loops.index, loops)], numbers)
         sizes = [cases.start.shape[1] for *_, cases in batches]
         self.ends = np.cumsum([0, *sizes]).tolist()
         self._room = _ESTIMATE * np.repeat([own.projection_radius if own else np.inf for own in gains], sizes)

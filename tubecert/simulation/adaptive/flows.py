@@ -68,14 +68,12 @@ class Fast:
     def __init__(self, adapts: bool, gains: LoopGains, P: Array, m: int, forces: int) -> None:
         self.adapts, self.gains, self.P, self.forces = adapts, gains, P, forces
         self.at, self._m = blocks(len(P), m), m
-        self._ahead = [
-            np.eye(self.at.end + 3 * forces, self.at.end + len(own[0]) * forces) for own in _POLYNOMIALS
-        ]
-        for ahead, own in zip(self._ahead, _POLYNOMIALS, strict=True):
-            ahead[self.at.end :, self.at.end :] = np.kron(own, np.eye(forces))
+        self._ahead, Y = list[Array](), self.at.end
+        for own in _POLYNOMIALS:
+            self._ahead.append(np.eye(Y + 3 * forces, Y + len(own[0]) * forces))
+            self._ahead[-1][Y:, Y:] = np.kron(own, np.eye(forces))
         self.root = np.sqrt(gains.adaptation_rate or 1.0)
-        layer = gains.smooth or 0.0
-        self.limit = gains.projection_radius / np.sqrt(1 + layer)  # 2.5: within this F <= 0
+        self.limit = gains.projection_radius / np.sqrt(1 + (gains.smooth or 0.0))  # 2.5: within this F <= 0
 
     def flow(self, B: Array, length: float, level: int) -> Flow:
         """The flows over a step of a level."""

@@ -144,8 +144,11 @@ class Geodesics:
             gain = np.einsum("ikn,ikn->n", curve.gradient, step)
             a = a - share * step
             done = (gain <= _LAST * curve.energy) & (share == 1)
-            own = _settled(curve, a)
-            if found is None:  # mostly of all lanes
+            uneven = curve.density.max(axis=0) - curve.density.min(axis=0)
+            resolved = (uneven <= _UNEVEN * curve.energy) & (curve.energy < np.inf)
+            status = np.where(resolved, FOUND, UNRESOLVED)
+            own = Geodesic(status, curve.energy, curve.m[:, 0], curve.m[:, -1], a)  # as if all were done
+            if found is None:
                 found = own
                 found.status[~done] = NOT_FOUND
             else:
@@ -195,13 +198,6 @@ class Geodesics:
         gradient = self._along @ m
         gradient[self._moving] -= self._across @ self._bent.run_floats_silenced([*slopes, *m], (Q, N))
         return _Curve(self._weight @ density, gradient, density, m, middle)
-
-
-def _settled(curve: _Curve, a: Array) -> Geodesic:
-    """The lanes as if they were done; `a` is one step further, for the next time."""
-    uneven = curve.density.max(axis=0) - curve.density.min(axis=0)
-    resolved = (uneven <= _UNEVEN * curve.energy) & (curve.energy < np.inf)
-    return Geodesic(np.where(resolved, FOUND, UNRESOLVED), curve.energy, curve.m[:, 0], curve.m[:, -1], a)
 
 
 def _some(p: Array, lanes: NDArray[np.intp] | NDArray[np.bool_]) -> Array:

@@ -204,10 +204,10 @@ class Lanes(NamedTuple):
 
 def lanes_of(batches: Sequence[Batch], loops: Sequence[int], plans: Sequence[int]) -> Lanes:
     """The lanes of batches with such loops and plans; where some have more waves than others the rest is 0."""
-    starts, acting = [cases.start for *_, cases in batches], []
-    for (_, loop, cases), (n, N) in zip(batches, (start.shape for start in starts), strict=True):
-        h = Disturbance.nothing(n, cases.h.amplitude.shape[1], N) if loop.controller == "nominal" else cases.h
-        acting.append(h)
+    starts, model = [cases.start for *_, cases in batches], batches[0][0].model
+    none = (Disturbance.from_expressions(None, model, start.shape[1]) for start in starts)
+    pairs = zip(batches, none, strict=True)
+    acting = [h if loop.controller == "nominal" else cases.h for (_, loop, cases), h in pairs]
     base, *others = dict.fromkeys(h.base for h in acting if h.base is not None) or [None]
     if others:
         raise ValueError("lanes of one vector have one base of h")

@@ -84,7 +84,7 @@ class Setting(Problem):
 
     def along(self, plan: Plan) -> Setting:
         """The same around another plan of the family that is certified; the state starts on it, or `within` of it."""
-        start = _start_of(plan)
+        start = Tape(plan.start, ()).run_floats([], ())
         return replace(self, plan=plan, x0=start, centre=start)
 
     @property
@@ -165,7 +165,8 @@ def setting_of(
     coordinates = None if rows is None else Coordinates(tuple(tuple(map(Fraction, row)) for row in rows))
     S = np.eye(len(model.states)) if coordinates is None else np.array(coordinates.rows, dtype=float)
     single = plan or plan_of(spec, model, result.plan.exact_knots())
-    horizon, centre, field = horizon_of(spec, duration), _start_of(single), Fields(model, coordinates)
+    horizon, field = horizon_of(spec, duration), Fields(model, coordinates)
+    centre = Tape(single.start, ()).run_floats([], ())  # x*(0), (n,)
     wanted = spec.simulation.h if spec.simulation and spec.simulation.h else spec.uncertainty.h
     reach = math.sqrt(metric.lower.below) * rho
     upper = metric.upper.above if metric.upper and math.isfinite(metric.upper.above) else None
@@ -205,11 +206,6 @@ def horizon_of(spec: Spec, duration: Fraction | None) -> float:
         message = f"the plan ends at {near(spec.trajectory.horizon)} s, before {near(wanted)} s"
         raise TubecertError([Finding(code="TC704", message=message, help="ask for a shorter duration")])
     return float(wanted)
-
-
-def _start_of(plan: Plan) -> Array:
-    """x*(0), (n,)."""
-    return Tape(plan.start, ()).run_floats([], ())
 
 
 def _rest(model: ControlAffineModel, fields: Fields) -> Matrix:

@@ -43,16 +43,6 @@ class Grid(NamedTuple):
     plan: Reference
 
 
-def corners(problem: Problem, plans: Sequence[Plan]) -> Array:
-    """Times (C,) that must be ends of steps."""
-    end = problem.horizon
-    kinks = np.concatenate([np.zeros(0), *(corners_of(plan.knots) for plan in plans if plan.knots)])
-    every = np.unique(np.minimum(np.concatenate([[0.0, end], problem.times, kinks[kinks < end]]), end))
-    t = every[np.concatenate([[True], np.diff(every) > _SAME * end])]
-    t[-1] = end
-    return np.asarray(t)
-
-
 def corners_of(knots: Knots) -> Array:
     """Times that no step may straddle: where u* has corners, or until when it is held; (K,)."""
     values = knots.u
@@ -82,17 +72,21 @@ def steps(problem: Problem, level: int, plans: Sequence[Plan], count: int | None
 
     With a `count` so many equal ones, which pass over the corners of plans, and no output times but the ends.
     """
-    t = corners(problem, plans) if count is None else np.array([0.0, problem.horizon])
-    fewest = np.ceil(np.diff(t) / problem.horizon * (count or _FEWEST_STEPS))
+    end, kinks = problem.horizon, [corners_of(plan.knots) for plan in plans if plan.knots]
+    inner = [] if count else [problem.times, *(own[own < end] for own in kinks)]
+    t = np.unique(np.minimum(np.concatenate([[0.0, end], *inner]), end))  # ends of steps
+    t = t[np.append(True, np.diff(t) > _SAME * end)]
+    t[-1] = end
+    fewest = np.ceil(np.diff(t) / end * (count or _FEWEST_STEPS))
     counts = np.maximum(1, fewest).astype(np.int64) * 2**level
     first = np.concatenate([[0], np.cumsum(counts)])
     length = np.repeat(np.diff(t) / counts, counts)
     start = np.repeat(t[:-1], counts) + (np.arange(first[-1]) - np.repeat(first[:-1], counts)) * length
-    seen = first if count else first[np.searchsorted(t, problem.times - 2 * _SAME * problem.horizon)]
+    seen = first if count else first[np.searchsorted(t, problem.times - 2 * _SAME * end)]
     courses = [_course(problem, plan, start, length) for plan in plans]
     return Grid(
         level=level,
-        start=np.append(start, problem.horizon),
+        start=np.append(start, end),
         length=np.append(length, 0.0),
         outputs=seen,
         plan=Reference(*(np.stack(part, axis=-1) for part in zip(*courses, strict=True))),

@@ -115,22 +115,16 @@ def random_members(kind: Class, genes: Array, offset: Array) -> Disturbance:
     part = np.where(own[0] < _FAINT, own[1], 1.0)
     size = kind.h * _ROUND * part * raw / np.maximum(raw.sum(axis=0), _TINY)
     shares = np.where(own[2::2] < 0.5, _ROUND, own[3::2])  # of a bound: all of it, half of the time
-    rates, steepness = (
-        _budgeted(10 ** (2.5 * each[:, 1 + i] - 1.5), size, bound * shares[i])
-        for i, bound in enumerate((kind.h_t, kind.h_x))
-    )
+    limits, speeds = np.array([[kind.h_t], [kind.h_x]]) * shares, 10 ** (2.5 * each[:, 1:3] - 1.5)
+    used = (size[:, None] * speeds).sum(axis=0)
+    scale = np.where(used > 0, limits / np.maximum(used, _TINY), 0.0)
+    rates, steepness = np.moveaxis(speeds * scale, 1, 0)
     amplitude, wave = size[:, None] * _unit(each[:, 4 : 4 + kind.m]), _unit(each[:, 4 + kind.m :])
     wave *= steepness[:, None]
     starts = (wave * offset).sum(axis=1), each[:, 3]
     still = Disturbance.nothing(kind.n, kind.m, genes.shape[1])
     waves = still._replace(amplitude=amplitude, frequency=rates, wave=wave)
     return waves._replace(phase=_phases(kind, waves, starts))
-
-
-def _budgeted(raw: Array, size: Array, budget: Array) -> Array:
-    """The rates (W, N), scaled so that sum size * rate is the budget (N,)."""
-    used = np.sum(size * raw, axis=0)
-    return np.asarray(raw * np.where(used > 0, budget / np.maximum(used, _TINY), 0.0))
 
 
 def triangle(waves: int) -> tuple[Array, Array]:
