@@ -264,3 +264,25 @@ limits: {{u: [{held - room}, {held + room}]}}
     found = certify(load_text(text, "tank.yaml"))
     assert (found.result.verdict == "certified") == (room > 1)
     assert found.notes.missed == told
+
+
+LAG = """tubecert: 1
+name: lag
+system: {states: [x], inputs: [u], f: ["-20*x"], B: [[20]]}
+safe_set: {x: [-1, 1]}
+disturbance: {bound: 0.01}
+trajectory: {kind: equilibrium, at: [0], input: [0]}
+hardware: {rate: 1, noise: 0.001}
+"""
+
+
+def test_a_sample_may_last_twenty_times_as_long_as_a_mode_takes():
+    found = certify(load_text(LAG)).result
+    assert found.verdict == "certified"
+    assert 0.01 / 20 < found.tube[0].half_widths["x"] < 1.1 * 0.01 / 20
+
+
+def test_a_wind_that_is_too_strong_is_not_told_as_what_is_not_linear():
+    (lack,) = certify(load_text(LAG.replace("bound: 0.01", "bound: 40") + "controller: none\n")).result.lacks
+    assert (lack.kind, lack.where) == ("safe_set", "x")
+    assert lack.needed == pytest.approx(1, rel=0.1)

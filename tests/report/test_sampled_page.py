@@ -137,7 +137,7 @@ def test_how_much_of_the_room_is_used(one, other):
 def test_the_remedy_names_what_asks_most():
     assert "start" in remedy(LACKS["inputs"], OF_CART, Notes(deviations={"F": sampled.PUSH}))
     assert "wind" in remedy(LACKS["wish"], OF_CART, Notes(long_run={"p": sampled.NARROW}))
-    assert "noise, wind, h or delay" in remedy(LACKS["inputs"], OF_CART, Notes())
+    assert "noise, wind, h, delay or the start" in remedy(LACKS["inputs"], OF_CART, Notes())
     assert "mode of p" in remedy(LACKS["mode"], OF_CART, Notes())
     assert "mode" not in remedy(LACKS["nothing found"], OF_CART, Notes())
 
@@ -191,7 +191,7 @@ def test_degrees_are_shown_as_degrees():
 
 @pytest.mark.parametrize(("missed", "told"), [
     ("input: [2]", "it is no equilibrium: input: [2] is"),
-    ("", "it misses its own equations: tubecert check tells where by much"),
+    ("", "it misses its own equations, or does not rest where it ends (tubecert check)"),
 ])  # fmt: skip
 def test_a_plan_that_misses_its_own_equations_is_told_on_the_first_screen(missed, told):
     certificate = sampled.certificate()

@@ -57,8 +57,8 @@ def _left_out(spec: Spec) -> list[Finding]:
         named = {output.name for output in spec.outputs}
         told = {
             f"tube.half_widths.{name}": (
-                f"a half-width of the output {name} beside hardware is no wish that is followed",
-                "wish for half-widths of states",
+                f"the half-width of the output {name} is asked for beside hardware; nothing is designed for it",
+                "it decides the verdict; what the design follows are wishes for states",
             )
             for name, _ in spec.tube.half_widths
             if name in named

@@ -26,7 +26,8 @@ from tubecert.trajectory.plan import Plan
 
 _FORGOTTEN: Final = 1e-4  # what is left of the oldest sample that counts
 _FEWEST: Final = 8
-_PARTS: Final = (2, 4, 8, 16)
+_PARTS: Final = (2, 4, 8, 16, 32, 64)
+_ENOUGH: Final = 16  # parts, but where a mode is faster
 _SETTLED: Final = 5e-3  # finer pieces that gain less are not worth it
 _SHORTER: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # of the lags, where they are enough
 _STEPS: Final = 200
@@ -51,20 +52,20 @@ def propose(
     recipe = Recipe(
         lags=lags,
         cuts=((lags,) * loop.H.shape[1],) * outputs,
-        pieces=_PARTS[0],
-        panels=_PARTS[0],
+        pieces=(few := _fewest(loop)),
+        panels=few,
         windows=remainders.windows,
         parameters="slow" if loop.slow else "sudden",
     )
     rough = Inequalities.made(remainders, controller, recipe)
     found = replace(rough, recipe=replace(recipe, cuts=_cuts(rough)))
     boxes = _fixed_point(found, report)
-    for panels in _PARTS[1:]:
+    for panels in _PARTS[_PARTS.index(few) + 1 : _PARTS.index(_ENOUGH) + 1]:
         finer = Inequalities.made(remainders, controller, replace(found.recipe, panels=panels))
         if np.max(1 - finer.of(boxes).W / np.maximum(found.of(boxes).W, 1e-300)) < _SETTLED:
             break
         found = finer
-    if (pieces := _pieces(found, boxes)) > _PARTS[0]:
+    if (pieces := _pieces(found, boxes)) > few:
         found = Inequalities.made(remainders, controller, replace(found.recipe, pieces=pieces))
     boxes = _fixed_point(found, report)
     if (several := _in_stages(found)) is not None:
@@ -79,12 +80,19 @@ def propose(
     return found, _stages(loop, boxes, found.starts)
 
 
+def _fewest(loop: Loop) -> int:
+    """Parts of a sample that last no longer than the fastest mode may take: chords miss e^(|A| s) of what acts."""
+    fastest = float(np.max(np.abs(np.linalg.eigvals(np.abs(loop.A))), initial=0.0)) * float(loop.sample_time)
+    return next((p for p in _PARTS if 3 * fastest <= p), _PARTS[-1])
+
+
 def _pieces(found: Inequalities, boxes: Boxes) -> int:
     """As many as it takes for what chords miss, which falls with their square, to be worth no more."""
     _, _, spread = found.terms(boxes)
     missed = np.max(spread / np.maximum(boxes.W[0], 1e-300))
-    enough = (p for p in _PARTS[:-1] if 0.75 * missed * (_PARTS[0] / p) ** 2 < _SETTLED)
-    return next(enough, _PARTS[-1])
+    few = found.recipe.pieces
+    wanted = (p for p in _PARTS if p >= few and 0.75 * missed * (few / p) ** 2 < _SETTLED)
+    return max(few, min(next(wanted, _ENOUGH), _ENOUGH))
 
 
 def _shorter(found: Inequalities, lags: int) -> Inequalities:
@@ -142,7 +150,8 @@ def _fixed_point(inequalities: Inequalities, report: Report | None) -> Boxes:
             boxes = Boxes(
                 *(np.maximum(old, _WIDER * new + 1e-30) for old, new in zip(boxes, found, strict=True))
             )
-    raise NoDesign("no_fixed_point", int(np.argmax(found.W[0] / widest)))
+    worst, nothing = int(np.argmax(found.W[0] / widest)), Boxes(*map(np.zeros_like, boxes))
+    raise NoDesign("no_fixed_point", worst, allowed=float(inequalities.of(nothing).W[0][worst]))
 
 
 def _within(inner: Boxes, outer: Boxes, share: float) -> bool:

@@ -211,7 +211,7 @@ class Held:
     kind = _kind("equilibrium")
     """Hold a point."""
     at = entry(keys.or_auto(keys.constants("states")), "x", needed=True, example=[0, 0])
-    """The point x*, one number per state; auto: the equilibrium nearest to `near`, x* and u*, to 20 digits."""
+    """The point x*, one number per state; auto: an equilibrium near `near`, x* and u*, to 20 digits."""
     near = entry(numbers("states"), "", example=[3.18, 4.96])
     """With at: auto: the point near which it is, one number per state; the middle of the safe set if left out."""
     input = entry(keys.constants("inputs"), "u", example=[0])

@@ -137,7 +137,7 @@ def unending(spec: Spec, knots: Knots | None) -> list[Finding]:
     if plan.afterwards != "repeat" or plan.horizon is None or _repeats(spec, plan.horizon, knots):
         return []
     ends = "the plan does not repeat: its ends differ, or its period is longer than the horizon or unknown"
-    help = "leave out afterwards, or give a plan whose period is not longer than trajectory.horizon"
+    help = "leave out afterwards, or give a plan of a period below trajectory.horizon (for 2*pi write 6.2832)"
     return [refused("trajectory.afterwards", ends, help)]
 
 

@@ -52,8 +52,8 @@ _FASTER: Final = "a higher hardware.rate, a shorter hardware.delay, less noise, 
 _AUTO: Final = "controller: auto; without one every mode must die away by itself"
 _HELP: Final[Mapping[Missing, str]] = {
     "no_design": "an input or a sensor for that mode of {where}",
-    "no_fixed_point": "a nearer start, less noise, wind or h, parameters that are known better, a higher "
-    "hardware.rate, or a plan that moves less",
+    "no_fixed_point": "a nearer start, less noise, wind, delay or h, parameters that are known better, a higher "
+    "hardware.rate, or, if the plan moves, one that moves less",
     "inputs": "wider limits, a plan that uses less of them, or less of what asks most: {largest}",
     "safe_set": "a larger safe_set, a plan farther from its sides, or less of what fills the tube",
     "start": "a nearer initial_state, or a larger wish or safe_set",
@@ -79,7 +79,7 @@ def plan(result: Result) -> str:
 
 def misses(fitting: str) -> str:
     """That the plan does not solve its own equations, and what would."""
-    moving = "it misses its own equations: tubecert check tells where by much"
+    moving = "it misses its own equations, or does not rest where it ends (tubecert check)"
     return f"it is no equilibrium: {fitting} is" if fitting else moving
 
 
@@ -105,7 +105,7 @@ def lacking(result: Result, notes: Notes) -> list[tuple[str, str, str]]:
 
 def why(lack: Lack, effective: Effective) -> str:
     """Why nothing is certified, with numbers in the unit of what lacks."""
-    unit = effective.system.units.get(lack.where, "")
+    unit = "" if lack.kind == "no_design" else effective.system.units.get(lack.where, "")
     needed, allowed = (f"{up(number)} {unit}".rstrip() for number in (lack.needed, lack.allowed))
     sentence, more = (_ALONE if is_alone(effective) else _WHY).get(lack.kind, _WHY[lack.kind])
     text = sentence if lack.needed is None else sentence + more
@@ -121,7 +121,9 @@ def remedy(lack: Lack, effective: Effective, notes: Notes) -> str:
     filled = notes.filled.get(lack.where)
     most = "" if filled is None else max(SHARES, key=lambda name: float(getattr(filled, name)))
     help = _HELP[lack.kind] if lack.where or lack.kind != "no_design" else _FASTER
-    return help.format(where=lack.where, largest=causes(effective).get(most, "noise, wind, h or delay"))
+    return help.format(
+        where=lack.where, largest=causes(effective).get(most, "noise, wind, h, delay or the start")
+    )
 
 
 def is_alone(effective: Effective) -> bool:
