@@ -79,7 +79,7 @@ def plan(result: Result) -> str:
 
 def misses(fitting: str) -> str:
     """That the plan does not solve its own equations, and what would."""
-    moving = "it misses its own equations, or does not rest where it ends (tubecert check)"
+    moving = "it misses its own equations, or ends in no rest: tubecert check"
     return f"it is no equilibrium: {fitting} is" if fitting else moving
 
 
