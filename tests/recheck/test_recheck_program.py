@@ -5,8 +5,9 @@ from fractions import Fraction
 import pytest
 from flint import arb
 
-from tubecert.recheck.balls import exact, power, square
-from tubecert.recheck.program import _KERNELS
+from tubecert.recheck.balls import between, exact, power, square
+from tubecert.recheck.program import _KERNELS, _WIDE, Program
+from tubecert.recheck.terms import variable
 
 NOTHING = arb("nan")
 
@@ -46,3 +47,30 @@ def test_a_square_is_positive_on_either_side_of_nought():
         assert 0.99 < float(square(wide).lower()) <= 1
         assert 2500 <= float(square(wide).upper()) < 2501
     assert square(arb(-1).union(arb(50))).contains(0)
+
+
+ENDS = [(Fraction(-7), Fraction(-3)), (Fraction(-1), Fraction(2)), (Fraction(3), Fraction(8))]
+
+
+@pytest.mark.parametrize("a", ENDS)
+@pytest.mark.parametrize("b", ENDS)
+def test_wide_products_and_quotients_reach_from_end_to_end(a, b):
+    x, y = variable("x"), variable("y")
+    own = [between(exact(low), exact(high)) for low, high in (a, b)]
+    times, over, cube = Program([x * y, x / y, y.raised(3)], "xy", wide=True).run(own)
+    known = [(times, [p * q for p in a for q in b])]
+    if b[0] < 0 < b[1]:
+        assert not over.is_finite()
+    else:
+        known += [(over, [p / q for p in a for q in b]), (cube, [q**3 for q in b])]
+    for found, values in known:
+        assert found.contains(exact(min(values)))
+        assert found.contains(exact(max(values)))
+        assert float(found.upper() - found.lower()) < float(max(values) - min(values)) * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("name", _WIDE)
+def test_what_is_not_a_number_stays_so_in_wide_products(name):
+    for other in (arb(1), arb(1, 0.5), arb("0 +/- inf")):
+        for args in ([NOTHING, other], [other, NOTHING][: 1 if name == "pow" else 2]):
+            assert not _WIDE[name](args, 2).is_finite() or (name == "pow" and not args[0].is_nan())

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from itertools import product
 
 from flint import arb
 
@@ -14,7 +16,8 @@ from tubecert.recheck.terms import Term, in_order, number_of, table_of
 class Program:
     """Terms as a straight line of steps, run on balls."""
 
-    def __init__(self, outputs: Sequence[Term], inputs: Sequence[str]) -> None:
+    def __init__(self, outputs: Sequence[Term], inputs: Sequence[str], *, wide: bool = False) -> None:
+        """`wide`: for wide balls, of which flint's own products and powers are wider than they can be."""
         order = in_order(outputs)
         place = {term: k for k, term in enumerate(order)}
         column = {name: k for k, name in enumerate(inputs)}
@@ -30,7 +33,8 @@ class Program:
                 self._inputs.append((k, column[str(term.value)]))
             else:
                 index = term.value if isinstance(term.value, int) else 0
-                kernel = term.op if term.op in ("add", "mul") else _kernel(term)
+                plain = term.op if term.op in ("add", "mul") else _kernel(term)
+                kernel = _WIDE.get(term.op, plain) if wide else plain
                 self._steps.append((k, kernel, [place[arg] for arg in term.args], index))
         self._outputs = [place[term] for term in outputs]
 
@@ -71,6 +75,18 @@ def _direction(args: list[Ball], index: int) -> Ball:
     return value.intersection(between(-1, 1)) if value.overlaps(between(-1, 1)) else value
 
 
+def _product(x: Ball, y: Ball) -> Ball:
+    """x y, by the products of the ends."""
+    if x.is_exact() or y.is_exact():
+        return x * y
+    return reduce(arb.union, (a * b for a, b in product((x.lower(), x.upper()), (y.lower(), y.upper()))))
+
+
+def _power(x: Ball, n: int) -> Ball:
+    """x^n, by its values at the ends where it is monotone between them."""
+    return power(x, n) if x.contains(0) else power(x.lower(), n).union(power(x.upper(), n))
+
+
 def _increasing(function: Callable[[Ball], Ball]) -> Callable[[list[Ball], int], Ball]:
     """An increasing function, by its values at the ends of a ball: flint's own are wide on wide balls."""
     return lambda args, _: between(function(args[0].lower()), function(args[0].upper()))
@@ -103,4 +119,8 @@ _KERNELS: Mapping[str, Callable[[list[Ball], int], Ball]] = {
     "log": _increasing(Ball.log),
     "norm": lambda a, _: length(a),
     "direction": _direction,
+}
+_WIDE: Mapping[str, Callable[[list[Ball], int], Ball]] = {
+    "mul": lambda a, _: _product(*a),
+    "pow": lambda a, n: _power(a[0], n),
 }

@@ -62,6 +62,14 @@ trajectory: {kind: equilibrium, at: [1000], input: [1000]}
 initial_state: {at: [1000]}
 hardware: {rate: 10, delay: 0.05, arithmetic: single}
 """
+SPRING = """
+tubecert: 1
+name: spring
+system: {states: [x, v], inputs: [F], parameters: {m: [0.9, 1.1]}, f: [v, "-10*x/m"], B: [[0], [1/m]]}
+safe_set: {x: [-1, 1], v: [-3, 3]}
+trajectory: {kind: equilibrium, at: [0.1, 0], input: [1]}
+hardware: {rate: 200, noise: {x: 0.001, v: 0.01}}
+"""
 PAIR = """
 tubecert: 1
 name: pair
@@ -100,6 +108,7 @@ MATRICES = {
     "swing": ([-1], [1], []),
     "family": ([0, 1, 0, -0.1], [0, 1], []),
     "far": ([-1], [1], []),
+    "spring": ([0, 1, -10, 0], [0, 1], []),
     "pair": ([0, -0.2, 0.1, 0], [1, 0.1, 0, 1], [1, 0, 0.5, 1]),
 }
 GAINS = {
@@ -108,6 +117,7 @@ GAINS = {
     SWING: ([[-2]],),
     FAMILY: ([[-4, -4]],),
     FAR: ([[-1]],),
+    SPRING: ([[-50, -12]],),
     PAIR: ([[-2, 0], [0, -2]], [[0.25]], [[0.5, 0.25]], [[0.5], [-0.25]]),
 }
 

@@ -1,9 +1,23 @@
 """Certificates of sampled loops that claim too much, with hashes made right: not one is confirmed."""
 
 import copy
+import re
 
 import pytest
-from sampled_files import CART, FAMILY, FAR, PAIR, SCALAR, SWING, changed, examine, made, resealed, why_not
+from sampled_files import (
+    CART,
+    FAMILY,
+    FAR,
+    PAIR,
+    SCALAR,
+    SPRING,
+    SWING,
+    changed,
+    examine,
+    made,
+    resealed,
+    why_not,
+)
 
 from tubecert.errors import ExitCode
 from tubecert.spec import load_text
@@ -11,7 +25,7 @@ from tubecert.spec.canonical import canonical
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", [SCALAR, CART, SWING, FAMILY, FAR, PAIR])
+@pytest.mark.parametrize("text", [SCALAR, CART, SWING, FAMILY, FAR, SPRING, PAIR])
 def test_what_is_certified_is_confirmed(text):
     document = made(text)
     assert document["result"]["verdict"] == "certified"
@@ -65,6 +79,7 @@ LIES = {
     "a steeper h": (SWING, spec("uncertainty", "h", 0), "0.05*sin(3*t) + 0.06*q"),
     "a larger h": (CART, spec("uncertainty", "h", 0), "0.3*sin(t)"),
     "a wider range of a parameter": (SWING, spec("system", "parameters", "c"), ["0.85", "1.15"]),
+    "a wider range of the mass on a spring": (SPRING, spec("system", "parameters", "m"), ["0.88", "1.12"]),
     "another plant": (SCALAR, spec("system", "f", 0), "0.6*x"),
     "more that is not linear": (CART, spec("system", "f", 1), "0.4*p**2"),
     "a start within more": (FAMILY, spec("initial_state", "within"), "0.12"),
@@ -112,6 +127,12 @@ def test_a_lie_is_not_confirmed(name):
     if path[0] == "lacks":
         document["result"]["lacks"] = []
     assert why_not(changed(document, *path, to=to))
+
+
+@pytest.mark.slow
+def test_a_bound_that_is_too_large_is_told_against_the_claim():
+    found = examine(changed(made(SCALAR), "tube", -1, "half_widths", "x", to=lambda W: W / 1.1))
+    assert re.fullmatch(r"sample \d+: the bound is 1\.\d+ of what is claimed", found.failing.outcome.why)
 
 
 @pytest.mark.slow

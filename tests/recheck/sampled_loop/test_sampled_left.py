@@ -73,6 +73,7 @@ RESTING = "{kind: equilibrium, at: [0], input: [0], horizon: 4}"
 THROUGH = "{kind: ilqr, start: [0], target: [2], horizon: 2, knots: 3, goal: false}"
 ROWS = ((Fraction(0),), (Fraction(1),), (Fraction(2),))
 KNOTS = Knots(t=tuple(map(Fraction, (0, 1, 2))), x=ROWS, u=ROWS)
+SPRING = 0.1 * sum(1 / (1 - 0.02 * k) ** 2 - 1 / (1 + 0.02 * k) ** 2 for k in range(1, 6)) / 5
 KNOWN = "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"
 
 
@@ -100,6 +101,8 @@ KNOWN = "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"
         ({"trajectory": "{kind: expressions, x: ['0.1*t'], u: ['0.1'], horizon: 2, afterwards: rest}"}, 0, (0.1, 0)),
         ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": -1}, 0, (0.1 + 0.05, 0)),
         ({**AT_ONE, "system": scalar("-p*x", more=RANGE), "A": -1, "slow": True}, 0, (0.05, 0)),
+        # 2 x/p is from (2 - 2 a W)/1.1 to (2 + 2 a W)/.9, and A in the middle of that
+        ({**AT_ONE, "system": scalar("(x**2 - 1)/p - 1", more=RANGE), "A": 70 / 33}, 0, (14 / 33, 0)),
     ],
 )  # fmt: skip
 def test_what_is_left(sections, U, through):
@@ -122,6 +125,8 @@ def test_what_is_left(sections, U, through):
         ({"disturbance": "{E: [[1]], bound: 0.3, rate: 2}", "E": [1]}, 0.3, 2, 0.3),
         ({"trajectory": WAVE, "system": scalar("(p - 1)*x**2", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
         ({"trajectory": WAVE, "system": scalar("0", "p", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
+        # a spring that the input holds: (u - x)/p^2 is 0 at p0, and no more known than p is on the way from there
+        ({**AT_ONE, "system": scalar("-x/p", "1/p", more=RANGE), "slow": True}, SPRING, 0, SPRING),
     ],
 )  # fmt: skip
 def test_sizes_and_rates(sections, size, rate, first):

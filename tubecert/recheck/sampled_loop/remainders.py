@@ -1,8 +1,8 @@
 """A plan in windows of its time or cells of a family's boxes; what of the loop is not linear on the tube around it.
 
 Windows tell where the plan is and how fast it moves; beside that: how far its input is from what the actuators hold,
-and how far it is from a motion of the plant. F(x + e, u + d) - F(x, u) - A e - B d is bounded by mean values: the
-slopes' distance from (A, B), on boxes that grow from the plan to the tube in some steps. All suprema are on balls.
+and how far it is from a motion of the plant. F(x + e, u + d) - F(x, u) - A e - B d is bounded by mean values: slopes'
+distance from (A, B) on balls that grow from the plan to the tube in some steps; what parameters do likewise, from p0.
 Implements: theory of the sampled loop, sections 1 and 4.
 """
 
@@ -271,20 +271,21 @@ class Remainders:
 
     def __init__(self, course: Course, nominal: Sequence[arb_mat], windows: int, *, slow: bool) -> None:
         self._course, self._spec, self._slow = course, course.spec, slow
-        self._A, self._B, self._E = nominal
+        (_, self._B, self._E), self._nominal = nominal, joined([nominal])
         self._n, self._m = self._B.nrows(), self._B.ncols()
         plant, wind, h = self._spec.plant, self._spec.disturbance, self._spec.uncertainty
         self._names = (*course.names, *plant.ranges)
-        self._parameters = [between(exact(a), exact(b)) for a, b in plant.ranges.values()]
+        self._middle = [exact((a + b) / 2) for a, b in plant.ranges.values()]
+        self._reach = [exact((b - a) / 2) for a, b in plant.ranges.values()]
         field = driven(plant.unknown or plant.f, plant.gained or plant.B, plant.inputs)
-        blown = () if wind is None else (e for row in wind.E for e in row)
-        self._slopes = Program([*_gradients(field, course.names), *blown], self._names)
+        blown = () if wind is None else zip(*wind.E, strict=True)
+        self._slopes = Program(_gradients(field, course.names, *blown), self._names, wide=True)
         strange = enumerate(f - known for f, known in zip(field, course.F, strict=True))
         self._strange = {i: e for i, e in strange if not names([e]).isdisjoint(plant.ranges)}  # 0 at p0
         if slow and self._strange and not course.smooth:
             raise ValueError("u* jumps, so that parameters are not slow")
         own, timed = h.h or (), (*plant.states, TIME)
-        self._h, self._slopes_of_h = Program(own, timed), Program(_gradients(own, timed), timed)
+        self._h, self._slopes_of_h = (Program(e, timed, wide=True) for e in (own, _gradients(own, timed)))
         self._sudden = h.h is None and not {"h_x", "h_t"} <= h.declared.keys()
         matched = [] if self._sudden else range(self._m)
         self._matched = [j for j in matched if h.h is None or h.h[j] is not NOUGHT]
@@ -355,13 +356,13 @@ class Remainders:
         """What parameters do along the plan, by row: how large, and how fast; 0 at p0, so bounded by slopes in p."""
         rows, moving = list(self._strange.values()), self._course.names
         own = [*rows, *_gradients(rows, moving)]
-        program = Program([*rows, *_gradients(own, tuple(self._spec.plant.ranges))], self._names)
-        reach = column([exact((b - a) / 2) for a, b in self._spec.plant.ranges.values()])
-        count, found = len(rows), []
+        program = Program(_gradients(own, tuple(self._spec.plant.ranges), own), self._names, wide=True)
+        count, by, found = len(rows), [*[arb(0)] * len(moving), *self._reach], []
         for window in self.windows:
-            values = program.run([*window.x, *window.u, *self._parameters])
-            far = (sizes(arb_mat(len(own), reach.nrows(), values[count:])) * reach).entries()
-            size = [x.abs_upper().min(y) for x, y in zip(values[:count], far[:count], strict=True)]
+            at = [*window.x, *window.u, *self._middle]
+            mean, last = _growing(program, at, by, arb_mat(len(own), len(self._reach) + 1))
+            far = (mean * column([*self._reach, arb(0)])).entries()
+            size = [last[i, len(self._reach)].min(far[i]) for i in range(count)]
             speeds = [*window.speed, *window.steepness, *[arb(0)] * (self._m - len(window.steepness))]
             steep = arb_mat(count, len(moving), far[count:])
             found.append([*size, *(steep * sizes(column(speeds))).entries()])
@@ -376,28 +377,18 @@ class Remainders:
         for j, eta in zip(self._matched, slow, strict=False):
             acting[j] = eta.size
         bent = tops(self._off(own, W, U, acting) for own in self.windows)
-        missed = list(self._defect)
-        if not self._slow:
-            for i, (size, _) in self._strangeness.items():
-                missed[i] += size
+        sudden = {} if self._slow else self._strangeness
+        missed = [x + sudden[i][0] if i in sudden else x for i, x in enumerate(self._defect)]
         return [*map(arb.__add__, bent, missed), *map(arb.__add__, self.held, self._steep(W))]
 
     def _off(self, own: Window, W: Sequence[Ball], U: Sequence[Ball], acting: Sequence[Ball]) -> list[Ball]:
         """What a window has of the remainder without the defect, (n,)."""
-        n, m, k = self._n, self._m, self._E.ncols()
-        nominal = joined([[self._A, self._B]])
-        weights = column([*W, *map(arb.__add__, U, self.held)])
-        total, off, values = arb_mat(n, 1), nominal, []
-        for step in range(1, _STEPS + 1):
-            share = arb(step) / _STEPS
-            x = _wider(own.x, [share * w for w in W])
-            u = _wider(own.u, [share * w + y for w, y in zip(U, self.held, strict=True)])
-            values = self._slopes.run([*x, *u, *self._parameters])
-            off = sizes(arb_mat(n, n + m, values[: n * (n + m)]) - nominal)
-            total += off * weights
-        of_u = arb_mat(n, m, [x for row in off.tolist() for x in row[n:]])
-        total = total / _STEPS + of_u * column(acting)
-        shaken = (arb_mat(n, k, values[n * (n + m) :]) - self._E).tolist()
+        n, others = self._n, [arb(0)] * self._E.ncols()
+        at = [*own.x, *_wider(own.u, self.held), *_wider(self._middle, self._reach)]
+        mean, last = _growing(self._slopes, at, [*W, *U, *[arb(0)] * len(self._reach)], self._nominal)
+        total = mean * column([*W, *map(arb.__add__, U, self.held), *others])
+        total += last * column([*[arb(0)] * n, *acting, *others])
+        shaken = (row[n + self._m :] for row in last.tolist())
         return [x + self._gusts.through(row) for x, row in zip(total.entries(), shaken, strict=True)]
 
     def _steep(self, W: Sequence[Ball]) -> list[Ball]:
@@ -411,10 +402,22 @@ class Remainders:
         return tops((sizes(own) * away).entries() for own in near)
 
 
-def _gradients(rows: Sequence[Term], by: Sequence[str]) -> list[Term]:
-    """The slopes of every row, row by row."""
-    columns = [slopes(rows, name) for name in by]
+def _gradients(rows: Sequence[Term], by: Sequence[str], *beside: Sequence[Term]) -> list[Term]:
+    """The slopes of every row, row by row, and columns beside them."""
+    columns = [*(slopes(rows, name) for name in by), *beside]
     return [e for row in zip(*columns, strict=True) for e in row]
+
+
+def _growing(
+    program: Program, at: Sequence[Ball], by: Sequence[Ball], nominal: arb_mat
+) -> tuple[arb_mat, arb_mat]:
+    """How far outputs are from what is nominal on boxes that grow until they are `by` wider: the mean, and the last."""
+    total, last = 0 * nominal, nominal
+    for step in range(1, _STEPS + 1):
+        values = program.run(_wider(at, [arb(step) / _STEPS * x for x in by]))
+        last = sizes(arb_mat(nominal.nrows(), nominal.ncols(), values) - nominal)
+        total += last
+    return total / _STEPS, last
 
 
 def _wider(x: Sequence[Ball], by: Sequence[Ball]) -> list[Ball]:
