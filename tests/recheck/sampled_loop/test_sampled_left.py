@@ -73,6 +73,7 @@ RESTING = "{kind: equilibrium, at: [0], input: [0], horizon: 4}"
 THROUGH = "{kind: ilqr, start: [0], target: [2], horizon: 2, knots: 3, goal: false}"
 ROWS = ((Fraction(0),), (Fraction(1),), (Fraction(2),))
 KNOTS = Knots(t=tuple(map(Fraction, (0, 1, 2))), x=ROWS, u=ROWS)
+RISE = "{kind: expressions, x: ['t'], u: ['1'], horizon: 1}"
 SPRING = 0.1 * sum(1 / (1 - 0.02 * k) ** 2 - 1 / (1 + 0.02 * k) ** 2 for k in range(1, 6)) / 5
 KNOWN = "{bounds: {h: 3, h_x: 0.2, h_t: 1}}"
 
@@ -125,6 +126,7 @@ def test_what_is_left(sections, U, through):
         ({"disturbance": "{E: [[1]], bound: 0.3, rate: 2}", "E": [1]}, 0.3, 2, 0.3),
         ({"trajectory": WAVE, "system": scalar("(p - 1)*x**2", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
         ({"trajectory": WAVE, "system": scalar("0", "p", more=RANGE), "slow": True}, 0.1, 0.1, 0.1),
+        ({"trajectory": RISE, "system": scalar("(p**6 - 1)*x", more=RANGE), "slow": True}, *[1.1**6 - 1] * 3),
         # a spring that the input holds: (u - x)/p^2 is 0 at p0, and no more known than p is on the way from there
         ({**AT_ONE, "system": scalar("-x/p", "1/p", more=RANGE), "slow": True}, SPRING, 0, SPRING),
     ],

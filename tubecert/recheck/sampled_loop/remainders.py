@@ -362,10 +362,10 @@ class Remainders:
             at = [*window.x, *window.u, *self._middle]
             mean, last = _growing(program, at, by, arb_mat(len(own), len(self._reach) + 1))
             far = (mean * column([*self._reach, arb(0)])).entries()
-            size = [last[i, len(self._reach)].min(far[i]) for i in range(count)]
+            far = [x.min(last[i, len(self._reach)]) for i, x in enumerate(far)]
             speeds = [*window.speed, *window.steepness, *[arb(0)] * (self._m - len(window.steepness))]
             steep = arb_mat(count, len(moving), far[count:])
-            found.append([*size, *(steep * sizes(column(speeds))).entries()])
+            found.append([*far[:count], *(steep * sizes(column(speeds))).entries()])
         top = tops(found)
         return dict(zip(self._strange, zip(top[:count], top[count:], strict=True), strict=True))
 
