@@ -199,8 +199,18 @@ def test_a_bug_in_the_producer_is_caught(bug, monkeypatch):
 HEAD = '{"format": "tubecert-certificate/3"'
 RUN = HEAD + ', "run": {}, "hash": "x", "result": {"verdict": '
 NINES = '{"x": ' + "9" * 10_000 + "}"
+HIDDEN = '{"x": "' + r"\"" + "]" * 10**5 + '", "y": ' + "[" * 10**5 + "]" * 10**5 + "}"
 NO_CERTIFICATES = {
-    "TC600": ["", "{", HEAD + ', "format": "x"}', '{"format": NaN}', '{"x": 1e999}', "[" * 10**5, NINES],
+    "TC600": [
+        "",
+        "{",
+        HEAD + ', "format": "x"}',
+        '{"format": NaN}',
+        '{"x": 1e999}',
+        "[" * 10**5,
+        HIDDEN,
+        NINES,
+    ],
     "TC601": ["{}", "[]", '"tubecert-certificate/3"'],
     "TC602": [f'{{"format": "tubecert-certificate/{k}"}}' for k in ("1", "4", "9" * 24)],
     "TC603": [HEAD + "}", RUN + '"maybe"}}', RUN + '"certified"}}'],

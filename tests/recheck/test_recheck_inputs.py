@@ -4,8 +4,10 @@ import copy
 
 import pytest
 import tampers
-from rechecked import certified, examine, failing, respecified, unconfirmed
+from rechecked import certified, examine, failing, respecified, sealed, unconfirmed
 from systems import BLOWN, SMALL
+
+from tubecert.errors import TubecertError
 
 # sup u* and inf u* have closed forms, and the feedback has something to do
 ONE = """
@@ -106,6 +108,14 @@ def test_planted_faults_are_unconfirmed(made, fault):
     forged = copy.deepcopy(made)
     FAULTS[fault](forged["result"])
     assert unconfirmed(forged)
+
+
+@pytest.mark.slow
+def test_a_name_that_no_input_has_names_no_claim(made):
+    forged = copy.deepcopy(made)
+    first(forged["result"]).update(input="u\n  confirmed   everything")
+    with pytest.raises(TubecertError, match="not u"):
+        examine(sealed(forged))
 
 
 @pytest.mark.slow

@@ -113,6 +113,12 @@ def test_that_the_box_of_a_family_leaves_refutes_nothing(claim):
     assert failing(examine(sealed(document)))
 
 
+def test_where_every_direction_has_an_input_no_rate_is_refuted():
+    made, told = certified(MOVING), {"claim": "metric_contraction", "rate": 0.9, "largest_rate": [0.1, 0.2]}
+    made["result"] |= {"verdict": "refuted", "reasons": [{**told, "verdict": "refuted", "at": {"x": [0]}}]}
+    assert unconfirmed(made)
+
+
 def test_a_start_is_compared_in_states_not_in_outputs():
     """A start within 0.4 is at most 0.04 off in a tenth of a state: 0.05 that is asked for of it is not missed."""
     text = SMALL.replace("epsilon: 0.2, rho_a: 0.1", "half_widths: {x: 0.45, tenth: 0.05}")

@@ -3,7 +3,10 @@
 import pytest
 
 from tubecert.recheck.balls import exact
+from tubecert.recheck.document import CertificateError, Node
+from tubecert.recheck.grammar import GrammarError, read
 from tubecert.recheck.metric import adjugate, determinant
+from tubecert.recheck.obstacles import read_obstacle
 from tubecert.recheck.program import Program
 from tubecert.recheck.terms import number, variable
 
@@ -38,3 +41,18 @@ def test_a_determinant_that_is_too_long_is_refused():
     rows = [[variable(f"a{i}_{j}") for j in range(14)] for i in range(14)]
     with pytest.raises(ValueError, match="too long"):
         determinant(rows)
+
+
+@pytest.mark.parametrize("text", ["1**" * 13_000 + "1", "1**(" * 35 + "1" + ")" * 35])
+def test_a_tower_of_powers_is_nested_too_deep(text):
+    with pytest.raises(GrammarError, match="deep"):
+        read(text, {})
+
+
+@pytest.mark.slow
+def test_a_polygon_has_no_more_corners_than_a_specification_may_have():
+    convex = [[str(k), str(k * k)] for k in range(201)]
+    few, many = (Node({"states": ["x", "y"], "polygon": own}, "obstacle") for own in (convex[1:], convex))
+    assert len(read_obstacle(few, "xy").corners) == 200
+    with pytest.raises(CertificateError, match="<= 200"):
+        read_obstacle(many, "xy")

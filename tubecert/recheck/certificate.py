@@ -98,7 +98,7 @@ def read_result(node: Node) -> Result:
         metric=own.get("metric", lambda item: _metric(item, len(states))),
         tube=own.get("tube", lambda item: _tube(item, specification.plant)),
         clearance=own.get("clearance", each(lambda item: item.record(Cleared))) or (),
-        inputs=own.get("inputs", each(read_limited)) or (),
+        inputs=own.get("inputs", each(lambda item: read_limited(item, specification.plant.inputs))) or (),
         constants=own.get("constants", lambda item: _constants(item, own, specification)),
         sections=sections,
         decided_by=own["decided_by"].texts() if searched else (),

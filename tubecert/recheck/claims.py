@@ -288,11 +288,9 @@ def _clearances(case: Case) -> Iterator[Claim]:
 
 def _planned_inputs(case: Case) -> Iterator[Claim]:
     for own in case.result.inputs:
-        name, key = (
-            f"{own.name}* of the plan is in the range that is stated",
-            (own.name, own.least, own.greatest),
-        )
-        yield Claim(name, (*case.over_tube, *key), partial(inputs.on_plan, case.place, own))
+        name = f"{own.name}* of the plan is in the range that is stated"
+        key = *case.over_tube, own.name, own.least, own.greatest
+        yield Claim(name, key, partial(inputs.on_plan, case.place, own))
 
 
 def _limited(

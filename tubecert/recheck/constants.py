@@ -40,9 +40,7 @@ from tubecert.recheck.terms import (
 )
 from tubecert.recheck.wind import added_to, joins, least_sum
 
-_ROUND_UP = 1 + Fraction(
-    1, 10**15
-)  # the end of a ball as the float next to it: off by 2^-53 of itself at most
+_ROUND_UP = 1 + Fraction(1, 10**15)  # the end of a ball as the float next to it: off by <= 2^-53 of itself
 _SOME = 2_000  # before the tube is examined part by part of the plan
 
 

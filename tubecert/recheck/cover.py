@@ -27,9 +27,7 @@ from flint import arb, ctx
 from tubecert.recheck.balls import Ball, ceiling, exact, floor
 from tubecert.recheck.boxes import Found, Test
 
-Told = Callable[
-    [int, float], None
-]  # how many boxes were examined of a claim, and which share of it is proven
+Told = Callable[[int, float], None]  # how many boxes were examined of a claim, which share of it is proven
 
 _END: ContextVar[float] = ContextVar("end", default=inf)
 _TOLD: ContextVar[Told | None] = ContextVar("told", default=None)

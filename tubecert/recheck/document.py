@@ -14,6 +14,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
+from itertools import accumulate
 from typing import Any, TypeVar
 
 from tubecert.errors import TubecertError
@@ -31,7 +32,9 @@ _MOST_FLOAT = 1e300  # whose shortest decimal is _MOST
 _PLAIN = re.compile(r"-?[0-9]{1,40}(\.[0-9]{1,40})?")  # most numbers: read without a grammar
 # nearly all of these: the form alone says that `spelled` gives the same text, and that the size is that of a float
 _SHORT = re.compile(r"0|-?[1-9][0-9]{0,20}|-?(0|[1-9][0-9]{0,12})\.[0-9]{0,20}[1-9]")
+_BRACKETS = re.compile(r'[\[\]{}]|"(?:[^"\\]++|\\.)*+"?', re.DOTALL)  # one, or a whole text
 _DECIMAL = re.compile(r"-?[0-9]+(/[0-9]+|(\.[0-9]+)?([eE][-+]?[0-9]+)?)")
+_FORMS: dict[type, str] = {dict: "an object", list: "a list"}
 T = TypeVar("T")
 
 CODES = {
@@ -69,10 +72,7 @@ class Node:
         return f"{owner.path}.{key[:60]}" if isinstance(key, str) else f"{owner.path}[{key}]"
 
     def _expected(self, kind: str) -> CertificateError:
-        shown = (
-            "an object" if isinstance(self.value, dict) else "a list" if isinstance(self.value, list) else ""
-        )
-        shown = shown or json.dumps(self.value, ensure_ascii=True)[:40]
+        shown = _FORMS.get(type(self.value)) or json.dumps(self.value, ensure_ascii=True)[:40]
         return self.refused(f"is {shown}, not {kind}")
 
     def refused(self, why: str) -> CertificateError:
@@ -184,14 +184,6 @@ class Node:
         """A list of texts."""
         return tuple(item.text() for item in self.entries())
 
-    def numbers(self) -> tuple[Fraction, ...]:
-        """A list of numbers of JSON."""
-        return tuple(item.number() for item in self.entries())
-
-    def decimals(self) -> tuple[Fraction, ...]:
-        """A list of numbers, or texts that are decimals or quotients."""
-        return tuple(item.decimal() for item in self.entries())
-
     def pair(self) -> tuple[Node, Node]:
         """Two values."""
         first, second = self.sized(2)
@@ -286,7 +278,7 @@ def read(text: str, file: str) -> Node:
         raise wrong(
             "TC600", f"this is no certificate, for it is not JSON ({error.msg})", _given_instead(file), at
         ) from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise wrong("TC600", f"{file}: {error}", "write the certificate again") from None
     known = data.get("format") if isinstance(data, dict) else None
     if not isinstance(known, str) or not (match := _VERSIONED.fullmatch(known)):
@@ -296,21 +288,17 @@ def read(text: str, file: str) -> Node:
     own = _KNOWN[match[1]]
     if known != own:
         newer = int(match[2][:9]) > int(own.rpartition("/")[2])
-        told = "a newer" if newer else "an older"
-        remedy = "use a newer tubecert" if newer else "certify again"
-        message = (
-            f"{file} was written by {told} version: its format is {known[:60]}, this version reads {own}"
-        )
-        raise wrong("TC602", message, remedy)
+        told, remedy = ("a newer", "use a newer tubecert") if newer else ("an older", "certify again")
+        why = f"{file} was written by {told} version: its format is {known[:60]}, this version reads {own}"
+        raise wrong("TC602", why, remedy)
     return Node(data, "certificate")
 
 
 def _float(text: str) -> float:
     """A number whose shortest decimal is what is written: the hash, which is of that decimal, binds it exactly."""
     value = float(text)
-    if len(text) > LONGEST or not math.isfinite(value):
-        raise ValueError(f"{text[:40]} is not the shortest decimal of a number")
-    if repr(value) != text and Decimal(repr(value)) != Decimal(text):
+    readable = len(text) <= LONGEST and math.isfinite(value)
+    if not readable or (repr(value) != text and Decimal(repr(value)) != Decimal(text)):
         raise ValueError(f"{text[:40]} is not the shortest decimal of a number")
     return value
 
@@ -334,11 +322,8 @@ def _refused(word: str) -> None:
 
 
 def _depth(text: str) -> int:
-    deepest = depth = 0
-    for bracket in re.finditer(r"[\[\]{}]", text):
-        depth += 1 if bracket[0] in "[{" else -1
-        deepest = max(deepest, depth)
-    return deepest
+    steps = ({"[": 1, "{": 1, '"': 0}.get(found[0][0], -1) for found in _BRACKETS.finditer(text))
+    return max(accumulate(steps), default=0)
 
 
 def digest(data: Any) -> str:

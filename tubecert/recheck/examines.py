@@ -129,14 +129,8 @@ _OF_EVERY: Final = (  # claims of a result that is not certified
     "the claim is that of the specification",
     "bounds are intervals",
 )
-_GIVEN: Final = (
-    "spec",
-    "plan",
-    "verdict",
-    "reasons.claim",
-    "reasons.verdict",
-    "reasons.section",
-)  # what it is about
+# what it is about
+_GIVEN: Final = ("spec", "plan", "verdict", "reasons.claim", "reasons.verdict", "reasons.section")
 _OF_REASONS: Final = ("reasons.margins.*", "reasons.predictor_gain")
 EXAMINED: Final[Mapping[str, str]] = {key: claim for claim, keys in _ROWS.items() for key in keys.split()}
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -18,7 +18,7 @@ from tubecert.recheck.terms import NOUGHT, UNIT, Term, looked_up, number, number
 PI = operation("pi")
 
 MOST_CHARACTERS = 40_000
-_DEEPEST = 60  # parentheses: each takes a few frames of the stack
+_DEEPEST = 60  # parentheses and exponents: each takes a few frames of the stack
 _DIGITS = 400  # characters of one number
 _EXPONENT = 300  # of one number
 _POWER = 12  # of one **
@@ -153,7 +153,7 @@ class _Reading:
         base = self._atom()
         if not self._takes("**"):
             return base
-        exponent = self._factor().term
+        exponent = self._inside(self._factor).term
         if exponent.op != "const" or number_of(exponent).denominator != 1:
             raise GrammarError("an exponent is not a whole number")
         n = int(number_of(exponent))
@@ -168,7 +168,7 @@ class _Reading:
         """A number, a name, a call, or a sum in parentheses"""
         kind, word, begin = self.kind, self.word, self._at
         if self._takes("("):
-            value = self._inside()
+            value = self._inside(self.sum)
             self._must(")")
             return value
         if kind in (None, "sign"):
@@ -178,9 +178,9 @@ class _Reading:
             return _bounded(number(_decimal(word)), 1)
         if word in _SMOOTH or word in _KINKS or word in self._tables:
             self._must("(")
-            args = [self._inside()]
+            args = [self._inside(self.sum)]
             while self._takes(","):
-                args.append(self._inside())
+                args.append(self._inside(self.sum))
             self._must(")")
             return self._call(word, args, begin)
         if word == "pi":
@@ -189,11 +189,11 @@ class _Reading:
             raise GrammarError(f"{word[:40]!r} is not known")
         return _Value(self._symbols[word])
 
-    def _inside(self) -> _Value:
+    def _inside(self, rule: Callable[[], _Value]) -> _Value:
         self._depth += 1
         if self._depth > _DEEPEST:
-            raise GrammarError(f"parentheses are nested more than {_DEEPEST} deep")
-        value = self.sum()
+            raise GrammarError(f"parentheses or exponents are nested more than {_DEEPEST} deep")
+        value = rule()
         self._depth -= 1
         return value
 

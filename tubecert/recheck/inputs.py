@@ -42,14 +42,14 @@ class Limited:
     bounds: Mapping[str, InputBound]
 
 
-def read_limited(node: Node) -> Limited:
-    """One of `result.inputs`."""
+def read_limited(node: Node, inputs: Sequence[str]) -> Limited:
+    """One of `result.inputs`, of an input that there is."""
     own = node.closed("input", "limits", "verdict", "plan", "bounds")
     low, high = own["limits"].pair()
     plan = own["plan"].closed("least", "greatest")
     bounds = own["bounds"].closed(optional=KEYS)
     return Limited(
-        name=own["input"].text(),
+        name=own["input"].word(*inputs),
         limits=(low.decimal(), high.decimal()),
         verdict=own["verdict"].word(*VERDICTS),
         least=enclosure(plan["least"]),

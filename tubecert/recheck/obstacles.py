@@ -10,6 +10,7 @@ from itertools import combinations, pairwise, product
 from tubecert.recheck.document import Enclosure, Node, enclosure, one_of, reads
 
 Point = tuple[Fraction, Fraction]
+_MOST_CORNERS = 200
 
 
 def _numbers(node: Node) -> Point:
@@ -58,8 +59,8 @@ def read_obstacle(node: Node, states: Sequence[str]) -> Obstacle:
         raise own["decide"].refused("is there only where it is false")
     disc = own.get("disc", lambda at: at.closed("center", "radius"))
     corners = own.get("polygon", lambda rows: tuple(_point(row) for row in rows.entries())) or ()
-    if disc is None and not is_simple(corners):
-        raise node.refused("must be a polygon whose edges meet at common corners only")
+    if disc is None and not (len(corners) <= _MOST_CORNERS and is_simple(corners)):
+        raise node.refused(f"must be a polygon of <= {_MOST_CORNERS} edges that meet at common corners only")
     radius = None if disc is None else disc["radius"].exact()
     if radius is not None and radius <= 0:
         raise node.refused("must have a positive radius")

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tubecert.recheck.document import Members, Node, enclosure, maybe
+from tubecert.recheck.document import Members, Node, each, enclosure, maybe
 from tubecert.recheck.kinds.kind import VERDICTS
 from tubecert.recheck.kinds.table import CONDITIONS
 from tubecert.recheck.specified.numbers import Numbers
@@ -81,7 +81,7 @@ def _at(node: Node, n: int) -> tuple[Fraction | None, Numbers]:
     own = node.closed("x", optional=("t",))
     if len(own["x"].entries()) not in (0, n):  # where the curve is not known there is no point of it
         raise own["x"].refused(f"must have {n} entries")
-    return own.get("t", Node.number), own["x"].numbers()
+    return own.get("t", Node.number), each(Node.number)(own["x"])
 
 
 def _claim(node: Node) -> str:

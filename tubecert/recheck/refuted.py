@@ -163,9 +163,8 @@ def _too_slow(told: _Told) -> Outcome:
     forms = (
         plus(s.contraction, s.W, 2 * rate) for rate in (s.rate, largest.above + _CLOSE * abs(largest.above))
     )
-    return _if(
-        all(is_indefinite(told.value(scaled(-1, times(turned(basis), times(form, basis))))) for form in forms)
-    )
+    values = (told.value(scaled(-1, times(turned(basis), times(form, basis)))) for form in forms)
+    return _if(len(s.inputs) < len(s.states) and all(map(is_indefinite, values)))
 
 
 def _not_killing(told: _Told) -> Outcome:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from tubecert.printable import visible
 from tubecert.report.page import Facts, Page, Section, Table
 
 if TYPE_CHECKING:
@@ -18,7 +19,9 @@ def page_of(found: Recheck, name: str, note: str = "") -> Page:
     return Page(
         name=name,
         verdict=found.verdict,
-        summary="; ".join(filter(None, (f"the certificate says {found.stated}", _failing(found), note))),
+        summary=visible(
+            "; ".join(filter(None, (f"the certificate says {found.stated}", _failing(found), note)))
+        ),
         sections=(
             Section(key="claims", title="Claims", blocks=(_table(claims),)),
             Section(key="rest", title="Further", blocks=(rest,)),
@@ -37,7 +40,7 @@ def _table(claims: Sequence[Examined]) -> Table:
     rows = (
         (
             item.outcome.verdict,
-            item.name if item.outcome.holds else f"{item.name}: {item.outcome.why}",
+            visible(item.name if item.outcome.holds else f"{item.name}: {item.outcome.why}"),
             str(item.outcome.boxes or ""),
         )
         for item in claims
@@ -46,6 +49,6 @@ def _table(claims: Sequence[Examined]) -> Table:
 
 
 def _rest(found: Recheck) -> Iterator[tuple[str, str]]:
-    yield "hash", found.hash
+    yield "hash", visible(found.hash)
     if found.unread:
         yield "not examined", f"for orientation only: {', '.join(found.unread)}"
