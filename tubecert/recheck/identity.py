@@ -28,6 +28,7 @@ from tubecert.recheck.terms import NOUGHT, UNIT, Term, function, in_order, numbe
 _WAVES = ("sin", "cos", "tan")
 _MULTIPLE = 24  # of a part
 _SUMMANDS = 4
+_MOST = 2_000_000  # products of terms for one question
 Sum = Mapping[Monomial, Fraction]
 
 
@@ -65,7 +66,7 @@ class _Parts:
         self._share: dict[Monomial, Fraction] = {}
         for own in sums:
             for monomial, q in own.items():
-                self._share[monomial] = _common(self._share.get(monomial, Fraction(0)), q)
+                self._share[monomial] = common_part(self._share.get(monomial, Fraction(0)), q)
 
     def reach(self, own: Sum) -> bool:
         """Whether the theorems are used for an argument."""
@@ -116,11 +117,10 @@ def _turned(a: tuple[Term, Term], b: tuple[Term, Term]) -> tuple[Term, Term]:
     return a[0] * b[0] - a[1] * b[1], a[1] * b[0] + a[0] * b[1]
 
 
-def _common(p: Fraction, q: Fraction) -> Fraction:
+def common_part(p: Fraction, q: Fraction) -> Fraction:
     """The largest number of which both are whole multiples."""
-    return Fraction(
-        gcd(p.numerator * q.denominator, q.numerator * p.denominator), p.denominator * q.denominator
-    )
+    top = gcd(p.numerator * q.denominator, q.numerator * p.denominator)
+    return Fraction(top, p.denominator * q.denominator)
 
 
 _INDETERMINATES = frozenset(
@@ -144,8 +144,11 @@ def vanish(terms: Sequence[Term]) -> bool:
     ring = fmpq_mpoly_ctx.get(labels, Ordering.lex)
     field = _Field(ring, ring.gens())
     value: dict[Term, _Quotient] = {}
-    for term in order:
-        value[term] = field.of(term, [value[arg] for arg in term.args])
+    try:
+        for term in order:
+            value[term] = field.of(term, [value[arg] for arg in term.args])
+    except OverflowError:
+        return False
     return all(value[term].top == 0 for term in terms)
 
 
@@ -164,15 +167,19 @@ def _exponentials(terms: Sequence[Term]) -> list[Term]:
 
 
 class _Field:
-    """Quotients over a ring in which every second indeterminate of a wave is its cosine."""
+    """Quotients over a ring in which what is found later comes first: a relation leads with its square.
+
+    Raises `OverflowError` once they took more products of terms than what vanishes is worth.
+    """
 
     def __init__(self, ring: Any, generators: Sequence[Polynomial]) -> None:
+        self._left = _MOST
         self._one, self._zero = ring.constant(1), ring.constant(0)
         self._free = list(generators)
-        self._atoms: dict[tuple[object, ...], Polynomial] = {}
-        self._waves: list[tuple[tuple[str, str], Polynomial, Polynomial]] = []
+        self._atoms: dict[tuple[object, ...], _Quotient] = {}
+        self._waves: dict[tuple[str, str], tuple[Polynomial, Polynomial]] = {}
         self._relations: list[Polynomial] = []
-        self._roots: list[Polynomial] = []
+        self._roots: list[_Quotient] = []
 
     def of(self, term: Term, args: list[_Quotient]) -> _Quotient:
         """A term, given its arguments."""
@@ -182,13 +189,12 @@ class _Field:
                 return self._whole(self._one * fmpq(q.numerator, q.denominator))  # type: ignore[union-attr]
             case "add":
                 a, b = args
-                return self._reduced(a.top * b.bottom + b.top * a.bottom, a.bottom * b.bottom)
+                top = self._times(a.top, b.bottom) + self._times(b.top, a.bottom)
+                return self._reduced(top, self._times(a.bottom, b.bottom))
             case "mul":
-                a, b = args
-                return self._reduced(a.top * b.top, a.bottom * b.bottom)
+                return self._product(*args)
             case "div":
-                a, b = args
-                return self._reduced(a.top * b.bottom, a.bottom * b.top)
+                return self._product(args[0], _Quotient(args[1].bottom, args[1].top))
             case "pow":
                 return self._power(args[0], exponent_of(term))
             case "sin" | "cos" | "tan":
@@ -201,51 +207,63 @@ class _Field:
             case "sqrt" if (known := _root(args[0])) is not None:
                 return self._whole(self._one * known)
             case "sqrt" if (same := self._same_root(args[0])) is not None:
-                return self._whole(same)
+                return same
         key = (term.op, str(term.value), *((str(a.top), str(a.bottom)) for a in args))
         if key not in self._atoms:
-            self._atoms[key] = atom = self._free.pop(0)
-            if term.op == "sqrt" and args[0].bottom != 0:
-                self._roots.append(atom)
-                self._relations.append(atom * atom * args[0].bottom - args[0].top)
-        return self._whole(self._atoms[key])
+            atom = self._free.pop()
+            self._atoms[key] = self._whole(atom)
+            if term.op == "sqrt" and (bottom := args[0].bottom) != 0:  # the atom is bottom sqrt(top/bottom)
+                square = self._reduced(self._times(args[0].top, bottom), self._one).top
+                self._relations.append(atom * atom - square)
+                self._atoms[key] = _Quotient(atom, bottom)
+                self._roots.append(self._atoms[key])
+        return self._atoms[key]
 
-    def _same_root(self, argument: _Quotient) -> Polynomial | None:
+    def _same_root(self, argument: _Quotient) -> _Quotient | None:
         """The root that is known already whose square is the argument: both are at least 0."""
-        for atom in self._roots:
-            if argument.bottom != 0 and self._square_of(atom, argument):
-                return atom
+        for root in self._roots if argument.bottom != 0 else ():
+            ratio = self._product(self._product(root, root), _Quotient(argument.bottom, argument.top))
+            if self._reduced(ratio.top - ratio.bottom, self._one).top == 0:
+                return root
         return None
-
-    def _square_of(self, atom: Polynomial, argument: _Quotient) -> bool:
-        return bool(self._reduced(atom * atom * argument.bottom - argument.top, self._one).top == 0)
 
     def _wave(self, argument: _Quotient) -> tuple[Polynomial, Polynomial]:
         """The sine and the cosine of an argument; both are the same for every term with that argument."""
         if argument.top == 0:
             return self._zero, self._one
         key = str(argument.top), str(argument.bottom)
-        for known, sine, cosine in self._waves:
-            if known == key:
-                return sine, cosine
-        sine, cosine = self._free.pop(0), self._free.pop(0)  # sine before cosine in the order of the ring
-        self._waves.append((key, sine, cosine))
-        self._relations.append(sine * sine + cosine * cosine - self._one)
-        return sine, cosine
+        if key not in self._waves:
+            cosine, sine = self._free.pop(), self._free.pop()  # sine before cosine in the order of the ring
+            self._waves[key] = sine, cosine
+            self._relations.append(sine * sine + cosine * cosine - self._one)
+        return self._waves[key]
 
     def _power(self, base: _Quotient, exponent: int) -> _Quotient:
         if exponent < 0:
             base, exponent = _Quotient(base.bottom, base.top), -exponent
         result = self._whole(self._one)
         for _ in range(exponent):
-            result = self._reduced(result.top * base.top, result.bottom * base.bottom)
+            result = self._product(result, base)
         return result
+
+    def _product(self, a: _Quotient, b: _Quotient) -> _Quotient:
+        return self._reduced(self._times(a.top, b.top), self._times(a.bottom, b.bottom))
+
+    def _times(self, a: Polynomial, b: Polynomial) -> Polynomial:
+        self._spend(len(a) * len(b))
+        return a * b
+
+    def _spend(self, products: int) -> None:
+        self._left -= products
+        if self._left < 0:
+            raise OverflowError("there are too many products")
 
     def _whole(self, p: Polynomial) -> _Quotient:
         return _Quotient(p, self._one)
 
     def _reduced(self, top: Polynomial, bottom: Polynomial) -> _Quotient:
-        for relation in self._relations:
+        for relation in reversed(self._relations):
+            self._spend((len(top) + len(bottom)) * len(relation))
             top, bottom = divmod(top, relation)[1], divmod(bottom, relation)[1]
         return _Quotient(top, bottom)
 

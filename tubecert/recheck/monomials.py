@@ -128,15 +128,16 @@ def expanded(
         return None
     ring, generators, relations = ring_of(factors)
     value: dict[Term, Polynomial] = {}
-    for term in order:
-        factor = _factor(term)
-        known = None if factor is None else generators[factor]
-        value[term] = found = _polynomial(term, [value[arg] for arg in term.args], known, ring)
-        if found is None:
+    try:
+        for term in order:
+            factor = _factor(term)
+            known = None if factor is None else generators[factor]
+            value[term] = _polynomial(term, [value[arg] for arg in term.args], known, ring)
+        if sum(len(value[term]) for term in outputs) > most:
             return None
-    if sum(len(value[term]) for term in outputs) > most:
+        return factors, [_written(value[term], relations) for term in outputs]
+    except OverflowError:
         return None
-    return factors, [_written(value[term], relations) for term in outputs]
 
 
 def ring_of(factors: Sequence[Term]) -> tuple[Any, dict[Term, Polynomial], list[Polynomial]]:
@@ -180,7 +181,7 @@ def exponent_of(term: Term) -> int:
 
 
 def _polynomial(term: Term, args: list[Polynomial], factor: Polynomial, ring: Any) -> Polynomial:
-    """A term from its arguments; None where it gets too large."""
+    """A term from its arguments; raises `OverflowError` where it gets too large."""
     match term.op:
         case "const":
             q = number_of(term)
@@ -188,9 +189,7 @@ def _polynomial(term: Term, args: list[Polynomial], factor: Polynomial, ring: An
         case "add":
             found = args[0] + args[1]
         case "mul":
-            if len(args[0]) * len(args[1]) > _LARGE:
-                return None
-            found = args[0] * args[1]
+            found = _product(*args)
         case "div":
             found = args[0] * factor ** _divisor(term)[1]
         case "pow" if factor is not None:
@@ -198,16 +197,27 @@ def _polynomial(term: Term, args: list[Polynomial], factor: Polynomial, ring: An
         case "pow":
             found = ring.constant(1)
             for _ in range(exponent_of(term)):
-                if len(found) * len(args[0]) > _LARGE:
-                    return None
-                found = found * args[0]
+                found = _product(found, args[0])
         case _:
             found = factor
-    return found if len(found) <= _LARGE else None
+    _limit(len(found))
+    return found
+
+
+def _product(a: Polynomial, b: Polynomial) -> Polynomial:
+    _limit(len(a) * len(b))
+    return a * b
+
+
+def _limit(terms: int) -> None:
+    if terms > _LARGE:
+        raise OverflowError("a polynomial has too many terms")
 
 
 def _written(p: Polynomial, relations: Sequence[Polynomial]) -> dict[Monomial, Quotient]:
     for relation in relations:
+        sine = relation.degrees().index(2)
+        _limit(sum(1 + exponents[sine] // 2 for exponents in p.monoms()))  # as many terms, or fewer, are left
         p = divmod(p, relation)[1]
     return {
         tuple((k, int(n)) for k, n in enumerate(exponents) if n): (int(q.p), int(q.q))

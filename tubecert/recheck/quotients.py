@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from flint import fmpq
+from flint.utils.flint_exceptions import DomainError
 
 from tubecert.recheck.monomials import Polynomial, exponent_of, ring_of
 from tubecert.recheck.terms import NOUGHT, UNIT, Term, in_order, number, number_of
@@ -126,10 +127,7 @@ class _Cancelling:
         """One over it: its numerator becomes a divisor, up to a number."""
         if a.top == 0:
             raise _TooLongError
-        top = self._one
-        for k, n in a.powers.items():
-            for _ in range(n):
-                top = self._times(top, self._divisors[k])
+        top = self._raised(_Quotient(self._one, {}), a.powers)
         leading = a.top.leading_coefficient()
         if a.top.is_constant():
             return _Quotient(top / leading, {})
@@ -159,7 +157,9 @@ class _Cancelling:
             raise _TooLongError
         found = a * b
         for relation in self._relations:
-            found = divmod(found, relation)[1]
+            found = divmod(found, relation)[1]  # twice as many terms at most, as a sine's square is replaced
+            if len(found) > _PRODUCT:
+                raise _TooLongError
         if len(found) > _LARGE:
             raise _TooLongError
         return found
@@ -179,9 +179,9 @@ class _Cancelling:
 def _divided(p: Polynomial, divisor: Polynomial, most: int) -> tuple[Polynomial, int]:
     """A polynomial without a divisor, and how often it was divided by it."""
     count = 0
-    while count < most:
-        quotient, rest = divmod(p, divisor)
-        if rest != 0 or p == 0:
+    while count < most and p != 0:
+        try:
+            p, count = p / divisor, count + 1  # stops at once where `divmod` can take hours
+        except DomainError:
             break
-        p, count = quotient, count + 1
     return p, count

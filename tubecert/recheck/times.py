@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import gcd
 
 from flint import arb
 
 from tubecert.recheck.balls import Ball, exact
 from tubecert.recheck.cover import Range
 from tubecert.recheck.grammar import PI
+from tubecert.recheck.identity import common_part
 from tubecert.recheck.specified.numbers import TIME
 from tubecert.recheck.specified.plant import Uncertainty
 from tubecert.recheck.terms import Term, in_order, names, number_of, slopes
@@ -79,7 +79,7 @@ def common_period(terms: Sequence[Term]) -> Period:
         raise ValueError(_NEEDED)
     common = Fraction(0)
     for q in rational or of_pi:
-        common = _common(common, q)
+        common = common_part(common, q)
     return Period(2 / common if common else Fraction(0), of_pi=bool(rational and common))
 
 
@@ -93,10 +93,3 @@ def _frequency(slope: Term) -> tuple[Fraction, bool] | None:
         q = slope.args[1 - slope.args.index(PI)]
         return (number_of(q), True) if q.op == "const" else None
     return None
-
-
-def _common(p: Fraction, q: Fraction) -> Fraction:
-    """The largest number of which both are whole multiples."""
-    return Fraction(
-        gcd(p.numerator * q.denominator, q.numerator * p.denominator), p.denominator * q.denominator
-    )
