@@ -1,5 +1,6 @@
 """`recheck --controller`: exported code is confirmed; what is changed in it is refused, with hashes made right."""
 
+import json
 import re
 from fractions import Fraction as Q
 
@@ -144,6 +145,23 @@ def test_a_changed_a_missing_and_a_further_file_are_refused():
     assert "none of its files" in examined(text, taken)
     removed = files["controller.c"].replace(b"status = STATUS_BAD", b"status |= 0")
     assert "runtime" in examined(text, {**files, "controller.c": sealed(removed)})
+    advice = files["README.txt"].replace(b"without -ffast-math", b"with -ffast-math")
+    assert "README.txt is not" in examined(text, {**files, "README.txt": sealed(advice)})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("u", ["010*0*t", "0" + "+0" * 3_000, "-" * 3_000 + "t"])
+def test_a_formula_that_python_does_not_read_is_refused(u):
+    document = json.loads(text_of(**PLANS["again"]))
+    document["result"]["spec"]["effective"]["trajectory"]["u"] = [u]
+    assert "not as tubecert writes it" in examined(json.dumps(document), files_for(**PLANS["again"]))
+
+
+@pytest.mark.slow
+def test_a_name_that_would_be_a_line_of_the_note_is_refused():
+    document = json.loads(text_of())
+    document["result"]["spec"]["effective"]["name"] = "s\n    cc -ffast-math controller.c"
+    assert "name" in examined(json.dumps(document), files_for())
 
 
 @pytest.mark.slow
@@ -154,7 +172,7 @@ def test_a_changed_a_missing_and_a_further_file_are_refused():
 )
 def test_code_of_another_certificate_is_refused(change):
     files = files_for(**(WAVE | change))
-    assert "README.txt" in examined(text_of(**WAVE), files), "README tells its certificate"
+    assert DATA in examined(text_of(**WAVE), files)
     hashes = [handmade.certificate(**own).hash.encode() for own in (WAVE | change, WAVE)]
     files |= {name: sealed(files[name].replace(*hashes)) for name in (DATA, "README.txt")}
     assert DATA in examined(text_of(**WAVE), files)

@@ -1,6 +1,6 @@
 """A folder of exported code against the certificate of a sampled loop: nothing of what wrote it is believed.
 
-The runtime is files of tubecert that a reader can judge, compared byte by byte. The data are written again here from
+The runtime is files of tubecert that a reader can judge, compared byte by byte. Data and README are written again from
 the certificate, and compared byte by byte as well; only the numbers of the plan are read, and compared with the curve
 of this room at the times that the theorem has (section 1): x* at a sample, u* at the middle or the beginning of the
 time in which that sample's command acts, from k Ts + delay to (k + 1) Ts + delay. A time beyond the end of a finite
@@ -34,7 +34,7 @@ from tubecert.recheck.specified.trajectory import Expressed, Resting
 from tubecert.recheck.terms import operation, variable
 
 _SHIPPED: Final = Path(__file__).parents[2] / "controller"
-_DATA, _README = "controller_data.h", "README.txt"
+_OWN: Final = (_DATA := "controller_data.h", "README.txt")
 _RUNTIME: Final = ("controller.c", "controller.h", "selftest.c")
 _ROUNDING: Final = Fraction(1, 2**21)  # of |x| and a width: more than rounding makes of a sample
 _PLAN: Final = re.compile(r"XS\[ROWS\]\[NX\] = ([^;]*);.*\n.* US\[ROWS\]\[NU\] = ([^;]*);")
@@ -61,40 +61,43 @@ def compared(document: Node, files: Mapping[str, bytes]) -> Iterator[tuple[str, 
     """The claims of files by their names, up to the first that is not so."""
     node, _, sealed = opened(document)
     result = read_result(node)
-    why = _changed(files, sealed)
+    why = _changed(files)
     yield "controller: the runtime is that of tubecert", stated(not why, why)
     if why:
         return
     spec, proven = result.specification, result.proven
-    texts = document.value["result"]["spec"]["effective"]["trajectory"]
+    effective = document.value["result"]["spec"]["effective"]
+    name, texts = effective["name"], effective["trajectory"]
     try:
         if proven is None:
             raise ValueError("nothing is certified")
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", name):
+            raise ValueError("the specification has no name")
         if spec.hardware.hold == "continuous" and not isinstance(spec.trajectory, Resting):
             raise ValueError("u* is proven to change within a sample, and code holds it")
         held = HeldPlan(course_of(spec, proven.plan), texts.get("x", ()), texts.get("u", ()))
         found = _PLAN.search(files[_DATA].decode("ascii"))
         xs, us = map(_rows, found.groups() if found else ())
-        same = files[_DATA] == _marked(_data(sealed, proven, held, xs, us).encode())
-        why = held.wrong(xs, us) if same else f"{_DATA} is not what tubecert writes for it"
-    except (ValueError, OverflowError, KeyError) as error:
+        own = _texts({"name": name, "hash": sealed}, proven, held, xs, us)
+        changed = [file for file in _OWN if files[file] != _marked(own[file].encode())]
+        same = not changed
+        why = held.wrong(xs, us) if same else f"{changed[0]} is not what tubecert writes for it"
+    except (ValueError, OverflowError, KeyError, SyntaxError, RecursionError, MemoryError) as error:
         same, why = False, f"{_DATA} is not as tubecert writes it ({error})"
-    yield "controller: the data are those of the certificate, digit for digit", stated(same, why)
+    yield f"controller: {' and '.join(_OWN)} are those of the certificate", stated(same, why)
     if same:
         yield "controller: the plan is that of the certificate when its commands act", stated(not why, why)
 
 
-def _changed(files: Mapping[str, bytes], certificate: str) -> str:
-    """What is not as it is shipped, or of another certificate; nothing if that is "". Objects are none."""
-    own = {*_RUNTIME, _DATA, _README}
+def _changed(files: Mapping[str, bytes]) -> str:
+    """What is not as it is shipped, missing, or compiled as well; nothing if that is "". Objects are none."""
+    own = {*_RUNTIME, *_OWN}
     for name in sorted(own ^ {name for name in files if name in own or name.endswith((".c", ".h", ".gch"))}):
         return f"{name[:60]} is {'none of its files' if name in files else 'missing'}"
     for name in _RUNTIME:
         if files[name] != _marked((_SHIPPED / name).read_bytes()):
             return f"{name} is not what tubecert writes"
-    text = files[_README].partition(b"\n")[2]
-    kept = files[_README] == _marked(text) and certificate.encode() in text
-    return "" if kept else f"{_README} is not what tubecert writes"
+    return ""
 
 
 def _marked(text: bytes) -> bytes:
@@ -107,22 +110,25 @@ def _rows(text: str) -> Rows:
     return [[single(float.fromhex(word)) for word in row.split(", ")] for row in rows]
 
 
-def _data(sealed: str, proven: Proven, held: HeldPlan, xs: Rows, us: Rows) -> str:
-    """The text of the data of what is proven and of the hash, with the plan that was found."""
+def _texts(told: Mapping[str, str], proven: Proven, held: HeldPlan, xs: Rows, us: Rows) -> dict[str, str]:
+    """The files of what is proven, with the name and the hash that are told and the plan that was found."""
     spec = held.course.spec
-    machine, plant = spec.hardware, spec.plant
+    machine, n, m, z = spec.hardware, len(spec.plant.states), len(proven.ranges), proven.tables["F"].nrows()
+    over = f"after {held.steps} samples: the last command is held from then on, and STATUS_END is told"
     matrices = {name: [list(map(float, row)) for row in own.tolist()] for name, own in proven.tables.items()}
     matrices |= {"xs": xs, "us": us}
     places: dict[str, object] = {
         **{name: "{" + ",\n".join(map(_array, rows or [[]])) + "}" for name, rows in matrices.items()},
         **{name: _array(own) for name, own in _limits(spec, proven).items()},
-        **{"n": len(plant.states), "m": len(plant.inputs), "z": proven.tables["F"].nrows()},
+        **{**told, "n": n, "m": m, "z": z, "work": (z + m) * (z + n)},
         **{"period": float(machine.sample_time), "delay": float(machine.delay), "lead": float(held.lead)},
-        **{"kind": held.kind, "steps": held.steps, "after": held.after, "hash": sealed},
+        **{"kind": held.kind, "steps": held.steps, "after": held.after},
         **{"rows": len(held.written), "formula_x": held.formula[0], "formula_u": held.formula[1]},
         "real": "float" if machine.arithmetic == "single" else "double",
+        "handed": "xs, us, " if held.course.family else "",
+        "end": over if held.after == held.steps else "never",
     }
-    return Template((_SHIPPED / f"{_DATA}.in").read_text("utf-8")).substitute(places)
+    return {file: Template((_SHIPPED / f"{file}.in").read_text("utf-8")).substitute(places) for file in _OWN}
 
 
 def _limits(spec: SampledSpecification, proven: Proven) -> dict[str, list[float]]:
