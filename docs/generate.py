@@ -1,7 +1,7 @@
 """Writes docs/reference/: python docs/generate.py
 
-From the table of keys (`tubecert.spec.keys`), the JSON Schemas, the pages of `explain` and what `verify` said of the
-published metrics. The schemas of specifications and of certificates of sampled loops are written as well.
+From the table of keys (`tubecert.spec.keys`), the records of certificates, the pages of `explain` and what `verify`
+said of the published metrics. The JSON Schemas are written as well.
 """
 
 from __future__ import annotations
@@ -12,24 +12,29 @@ import json
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import is_dataclass
 from decimal import ROUND_CEILING, Context
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 import forms  # noqa: E402
 
-from tubecert.enclosure.interval import Array  # noqa: E402
+from tubecert import certificate as of_continuous  # noqa: E402
+from tubecert import records  # noqa: E402
+from tubecert.certificate import effective, result  # noqa: E402
+from tubecert.certificate.notes import NOTES, Places  # noqa: E402
+from tubecert.claims import written  # noqa: E402
 from tubecert.expression import MAX_LENGTH, MAX_NAME_LENGTH  # noqa: E402
-from tubecert.records import members  # noqa: E402
+from tubecert.kinds.table import KINDS  # noqa: E402
 from tubecert.report import pages  # noqa: E402
-from tubecert.sampled_loop.record import FORMAT, Notes, Result  # noqa: E402
+from tubecert.sampled_loop import record as of_samples  # noqa: E402
+from tubecert.spec import metric_file  # noqa: E402
 from tubecert.spec.keys import LIST, NAME, NUMBER, PAIR, Section  # noqa: E402
 from tubecert.spec.load import FILE  # noqa: E402
+from tubecert.spec.metric import METRIC  # noqa: E402
 from tubecert.spec.plan import PLANS  # noqa: E402
 
 REFERENCE = ROOT / "docs" / "reference"
@@ -127,8 +132,10 @@ class Reference:
         required = set(schema.get("required", ()))
         for key, value in schema.get("properties", {}).items():
             name = f"{path}.{key}" if path else key
-            mark = " (required)" if key in required else ""
-            rows.append(f"| `{key}`{mark} | {self._kind(name, value)} | {self._meaning(value)} |")
+            mark, kind = " (required)" if key in required else "", self._kind(name, value)
+            if not mark and "anyOf" in value:
+                kind = kind.removesuffix(" or null")  # what is left out may be null as well
+            rows.append(f"| `{key}`{mark} | {kind} | {self._meaning(value)} |")
         yield "\n".join(rows)
 
     def _resolved(self, value: dict[str, Any]) -> dict[str, Any]:
@@ -139,7 +146,7 @@ class Reference:
 
     def _kind(self, path: str, value: dict[str, Any]) -> str:
         """What a value is, in words; mappings get sections of their own."""
-        if "$ref" in value:
+        if "$ref" in value and "properties" not in value:
             name = value["$ref"].rsplit("/", 1)[1]
             if "properties" not in self.schema["$defs"][name]:
                 return name
@@ -320,39 +327,129 @@ def _of_source(source: str, group: list[dict[str, Any]]) -> str:
     return f"| {source} | {len(group)} | {len(group) - len(failed)} | {told} |"
 
 
-def sampled_loop() -> dict[str, Any]:
-    """The schema of certificates of sampled loops, from their records and the words of these."""
-    result, notes = (_described(forms.schema(kind), kind) for kind in (Result, Notes))
+_DECIMAL = {
+    "description": "An exact decimal, or a quotient as text.",
+    "type": ["number", "string"],
+    "pattern": f"^({records._DECIMAL.pattern}|{records._QUOTIENT.pattern})$",
+}
+_SPECIFICATION = {"description": "An effective specification.", "type": "object"}
+
+
+def certificate() -> dict[str, Any]:
+    """The schema of certificates, from their records and the words of these."""
+    proven, noted = _parted(forms.schema(result.Result), NOTES)
+    proven["properties"]["decided_by"]["items"] = {"enum": [kind.key for kind in KINDS]}
+    asked = {
+        "description": "`metric.synthesise` of the specification, or what the command line asked for.",
+        "type": "object",
+        "required": [*effective._ASKED],
+        "propertyNames": {"enum": [*effective._ASKED, *effective._MAY_ASK]},
+        "additionalProperties": {"type": ["string", "array"], "items": {"type": "string"}},
+    }
+    ends = "[proven below, proven above]; null where no bound was found."
+    defined = {
+        "enclosure": {"description": ends, **forms.schema(tuple[float | None, float | None])},
+        "point": forms.schema(written._Place),
+        "asked": asked,
+        **{name: forms.family(kind) for name, kind in forms.FAMILIES.items()},
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "urn:tubecert:certificate:2",
+        "title": "tubecert certificate",
+        "description": "What `certify` writes, for every verdict. `recheck` reads these keys and no others: more keys "
+        "are another version.",
+        **_sealed(of_continuous.FORMAT, proven, noted, forms.schema(result.Run)),
+        "additionalProperties": False,
+        "$defs": {"decimal": _DECIMAL, "specification": _SPECIFICATION, **defined},
+    }
+
+
+def _parted(form: dict[str, Any], tree: Places) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The forms of what stays of a value and of its notes, as `certificate.notes.split` parts the value."""
+    for key, inner in (("items", tree), ("additionalProperties", tree.get("*", tree))):
+        if isinstance(form.get(key), dict):
+            stays, told = _parted(form[key], inner)
+            return {**form, key: stays}, {**form, key: told}
+    if "anyOf" in form:
+        stays, told = _parted(form["anyOf"][0], tree)
+        return {**form, "anyOf": [stays, {"type": "null"}]}, told
+    own, noted = dict(form["properties"]), {}
+    beside = [key for key in tree if key not in own]  # of members of a family
+    for key, inner in tree.items():
+        if key in beside:
+            noted[key] = _of_family(form["$ref"], key)
+        elif inner:
+            own[key], told = _parted(own[key], inner)
+            noted[key] = {**told, "description": f"What explains `{key}`."}
+        else:
+            noted[key] = own.pop(key)
+    stays = {**form, "properties": own, **({"not": {"required": beside}} if beside else {})}
+    words = "What explains it and claims nothing."
+    told = {"type": "object", "description": words, "properties": noted, "additionalProperties": False}
+    return stays, told
+
+
+def _of_family(reference: str, key: str) -> dict[str, Any]:
+    """The form of a member of a family's record."""
+    family = forms.family(forms.FAMILIES[reference.rpartition("/")[2]])
+    return next(own["properties"][key] for own in family["anyOf"] if key in own["properties"])
+
+
+def _sealed(version: str, proven: Any, noted: Any, run: Any) -> dict[str, Any]:
+    """What a file with a hash has: the forms of what was proven, of notes, and of how it was made."""
     words = {
-        "format": ({"const": FORMAT}, "Version of the format."),
+        "format": ({"const": version}, "Version of the format."),
         "hash": (
             {"type": "string"},
             "SHA-256 of the canonical bytes of `result`: UTF-8, sorted keys, no spaces.",
         ),
-        "result": (result, "What was proven. This is hashed, and `recheck` examines it."),
-        "notes": (notes, "What explains and claims nothing: neither hashed nor examined."),
-        "run": ({"type": "object"}, "How it was made: command line, versions, times; not hashed."),
+        "result": (proven, "What was proven. This is hashed, and `recheck` examines it."),
+        "notes": (noted, "What explains and claims nothing: neither hashed nor examined."),
+        "run": (run, "How it was made: command line, versions, times; not hashed."),
     }
+    properties = {key: {**form, "description": told} for key, (form, told) in words.items()}
+    return {"type": "object", "required": list(words), "properties": properties}
+
+
+def metric() -> dict[str, Any]:
+    """The schema of metric files: what is read, in the words of the specification; and what else they may have."""
+    reported, used = forms.schema(result.MetricFile)["properties"], described_section(METRIC)["properties"]
+    words = {key: {"description": form["description"]} for key, form in reported.items()}
+    read = {"format": {"const": metric_file.FORMAT, "description": "Version of the format."}}
+    read |= {key: used[key] for key in ("rate", "dual_metric")}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "urn:tubecert:metric:1",
+        "title": "tubecert metric file",
+        "description": "A dual metric with its rate, as `synth` writes it and `certify --metric` reads it. Only rate "
+        "and dual_metric are used; all else is proven again.",
+        "type": "object",
+        "required": list(read),
+        "properties": {**read, **{key: form for key, form in words.items() if key not in read}},
+        "additionalProperties": False,
+        "$defs": {name: _VALUES[name] for name in ("number", "expression")},
+    }
+
+
+def sampled_loop() -> dict[str, Any]:
+    """The schema of certificates of sampled loops, from their records and the words of these."""
     row = {"type": "array", "items": {"type": "string", "description": "A float in hexadecimal."}}
     matrix = {
         "columns": {"type": "integer", "description": "How many."},
         "rows": {"type": "array", "items": row},
     }
     matrix["rows"]["description"] = "Row by row, every number exact."
+    proven, noted = forms.schema(of_samples.Result), forms.schema(of_samples.Notes)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:tubecert:sampled-loop:1",
         "title": "tubecert certificate of a sampled loop",
         "description": "What `certify` writes for a specification with `hardware`, for every verdict.",
-        "type": "object",
-        "required": list(words),
-        "properties": {key: {**form, "description": told} for key, (form, told) in words.items()},
+        **_sealed(of_samples.FORMAT, proven, noted, {"type": "object"}),
         "$defs": {
-            "decimal": {
-                "description": "An exact decimal, or a quotient as text.",
-                "type": ["number", "string"],
-            },
-            "specification": {"description": "An effective specification.", "type": "object"},
+            "decimal": _DECIMAL,
+            "specification": _SPECIFICATION,
             "matrix": {
                 "description": "A matrix.",
                 "type": "object",
@@ -430,67 +527,25 @@ def _words(make: type) -> dict[str, str]:
     return found
 
 
-_MATRIX = "A matrix of floats (p, q) that are exact numbers: written as hexadecimal texts, row by row."
-
-
-def _described(form: dict[str, Any], kind: Any) -> dict[str, Any]:
-    """A record's schema, closed, with the sentence of its words that names each key, or else all of them."""
-    words = " ".join((kind.__doc__ or "").split())
-    hints = {item.name: hint for item, hint in members(kind)}
-    sentences = re.split(r"(?<=[.;]) ", words.replace("| None", ""))
-    for key, value in form["properties"].items():
-        inner = next(filter(is_dataclass, (hints[key], *get_args(hints[key]))), None)
-        target = next((each for each in _forms(value) if "properties" in each), None)
-        if inner is not None and target is not None:
-            _described(target, inner)
-        own = _MATRIX if hints[key] == Array else f"{key}.".replace("_", " ")
-        if inner:
-            own = " ".join((inner.__doc__ or "").partition("\n\n")[0].split())
-        told = next((sentence.rstrip(";") for sentence in sentences if f"`{key}`" in sentence), own)
-        form["properties"][key] = _of_one_kind(value) | {"description": told}
-    form["additionalProperties"] = False
-    return form
-
-
-def _forms(value: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """A schema and those within it."""
-    inner = [value[key] for key in ("items", "additionalProperties") if isinstance(value.get(key), dict)]
-    yield value
-    for each in (*inner, *value.get("anyOf", ())):
-        yield from _forms(each)
-
-
-def _of_one_kind(value: dict[str, Any]) -> dict[str, Any]:
-    """A list of fixed length, all of whose entries are alike, as such."""
-    if "items" in value:
-        return value | {"items": _of_one_kind(value["items"])}
-    if "prefixItems" not in value:
-        return value
-    count = len(value["prefixItems"])
-    return {"type": "array", "items": value["prefixItems"][0], "minItems": count, "maxItems": count}
+def schemas() -> dict[str, dict[str, Any]]:
+    """Every schema by its name."""
+    found = (specification(), metric(), certificate(), sampled_loop())
+    return dict(zip(("spec", "metric", "certificate", "sampled-loop"), found, strict=True))
 
 
 def everything() -> dict[str, str]:
     """The text of every page by its file name."""
-    schemas = {
-        "specification": "spec",
-        "metric": "metric",
-        "certificate": "certificate",
-        "sampled-loop": "sampled-loop",
-    }
-    made = {}
-    for name, short in schemas.items():
-        path = ROOT / "tubecert" / "schemas" / f"{short}.schema.json"
-        made[f"{name}.md"] = Reference(json.loads(path.read_text(encoding="utf-8"))).page()
+    made = {f"{name}.md": Reference(schema).page() for name, schema in schemas().items()}
+    made["specification.md"] = made.pop("spec.md")
     return {**made, "codes.md": codes(), "published.md": published()}
 
 
 def main() -> None:
-    """Write the pages."""
+    """Write schemas and pages."""
     REFERENCE.mkdir(exist_ok=True)
-    for short, schema in (("sampled-loop", sampled_loop()), ("spec", specification())):
+    for name, schema in schemas().items():
         text = json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
-        (ROOT / "tubecert" / "schemas" / f"{short}.schema.json").write_text(text, encoding="utf-8")
+        (ROOT / "tubecert" / "schemas" / f"{name}.schema.json").write_text(text, encoding="utf-8")
     for name, text in everything().items():
         (REFERENCE / name).write_text(text, encoding="utf-8")
 

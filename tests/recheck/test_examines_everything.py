@@ -86,11 +86,9 @@ def test_a_key_without_a_row_is_refused(where):
 
 def paths(node, schema, path=(), seen=()):
     """The paths of a JSON Schema at which values stand; `*` for names of somebody else's."""
-    if "$ref" in node:
-        name = node["$ref"].rpartition("/")[2]
-        if name not in seen:
-            yield from paths(schema["$defs"][name], schema, path, (*seen, name))
-        return
+    name = node.get("$ref", "").rpartition("/")[2]
+    if name and name not in seen:
+        yield from paths(schema["$defs"][name], schema, path, (*seen, name))
     inner = [(own, path) for key in ("anyOf", "oneOf", "allOf", "prefixItems") for own in node.get(key, ())]
     inner += [(node[key], path) for key in ("then", "else", "items") if isinstance(node.get(key), dict)]
     inner += [(own, (*path, key)) for key, own in node.get("properties", {}).items()]

@@ -30,7 +30,7 @@ from tubecert.verdict import Verdict
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricRow:
-    """One metric of a comparison; `input_gain` is beta/sqrt(a) over the tube, `adaptation_rate` the least of B."""
+    """One metric of a comparison; `input_gain`: that of the tube, beta/sqrt(a); `adaptation_rate`: the least of B."""
 
     rate: Fraction
     floor: Literal["identity", "input"]
@@ -46,7 +46,7 @@ class MetricRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RateLimit:
-    """What is against another rate; there `factor` times the gains would be needed."""
+    """What is against another rate; `cause`: what kind of thing; `factor`: how many times the gains would be needed."""
 
     rate: Fraction
     cause: Literal["distance", "overshoot", "gains", "no_metric", "idle", "input_gain", "tube"]
@@ -63,7 +63,7 @@ class RateLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SolverData:
-    """How a metric was found."""
+    """How a metric was found; `variables`: those that W depends on; `digits`: how many its entries have."""
 
     route: str
     degree: int
@@ -73,7 +73,10 @@ class SolverData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchData:
-    """What was tried by a synthesis, and why there is no metric where there is none."""
+    """What was tried by a synthesis, and why there is no metric where there is none.
+
+    `objective`: what it was to be best in; `verdict`: whether one was found, or is excluded; `cut`: what ended it.
+    """
 
     objective: str
     verdict: Verdict
@@ -88,7 +91,7 @@ class SearchData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisData:
-    """What was asked of a synthesis, and how it went."""
+    """What was asked of a synthesis, and how it went; `asked`: what the metric has to be."""
 
     asked: Asked
     search: SearchData | None = None
@@ -98,7 +101,9 @@ class SynthesisData:
 class ClearanceData:
     """An obstacle of the specification, in its order: the clearance of the tube, and the time at which it is least.
 
-    `inside`: a point of the obstacle that the tube contains then.
+    `verdict`: certified if the tube keeps away from it at all times, refuted if it contains a point of it; `decides`:
+    whether the verdict of the certificate asks for it; `clearance`: by how much the tube keeps away at least, and what
+    was found at a time; `t`: the time of that, in s; `inside`: a point of the obstacle that the tube contains then.
     """
 
     verdict: Verdict
@@ -111,7 +116,7 @@ class ClearanceData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanInputData:
-    """Enclosures of inf u* and of sup u* on the plan, of one input."""
+    """What one input is on the plan; `least`: encloses inf u*; `greatest`: encloses sup u*."""
 
     least: Constant
     greatest: Constant
@@ -119,7 +124,11 @@ class PlanInputData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputData:
-    """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key."""
+    """An input with limits: what it does on the plan, and in the loop of every kind that is certified, by its key.
+
+    `input`: its name; `limits`: those of the specification; `verdict`: certified if the plan, and every loop whose kind
+    decides, stays within them, refuted if the plan itself does not; `bounds`: what it is in each loop, by section.
+    """
 
     input: str
     limits: tuple[Fraction, Fraction]
@@ -137,7 +146,9 @@ class InputData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """What the claim is about: the specification after overrides, and the hashes of it and of the file's text."""
+    """What the claim is about; `effective`: the specification after overrides, defaults written out, numbers exact,
+    itself a specification; `effective_hash`: the hash of its canonical bytes; `file_hash`: the hash of the file's text.
+    """
 
     effective: Effective
     effective_hash: str
@@ -146,7 +157,9 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """The initial state that is claimed about: a point, a box, or anything within a radius of the plan's start."""
+    """The initial state that is claimed about, one of these; `at`: the point; `within`: the radius about the plan's
+    start; `box`: the range of every state.
+    """
 
     at: tuple[str, ...] | None = None
     within: str | None = None
@@ -159,7 +172,9 @@ class Start:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plans:
-    """Every plan that is claimed about: x* and u* in boxes, and the defect at most so large; exact texts."""
+    """Every plan that is claimed about, in exact texts; `x`: the box of x*, [lower, upper] by state; `u`: the box of
+    u*, by input; `defect`: what |x*' - f(x*) - B(x*) u*| is at most.
+    """
 
     x: Mapping[str, tuple[str, str]]
     u: Mapping[str, tuple[str, str]]
@@ -168,7 +183,7 @@ class Plans:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blowing:
-    """Every wind that is claimed about: |w| and, where it is known, |w'| at most; exact texts."""
+    """Every wind that is claimed about, in exact texts; `bound`: what |w| is at most; `rate`: what |w'| is at most."""
 
     bound: str
     rate: str | None = None
@@ -176,7 +191,13 @@ class Blowing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claimed:
-    """What is claimed, in words of its own, exact texts; `recheck` derives it again from the specification."""
+    """What is claimed, in words of its own, exact texts; `recheck` derives it again from the specification.
+
+    `id`: the state stays within the tube; `horizon`: until when, in s, or null for all t >= 0; `for_all_time`: why the
+    claim is for all t >= 0: the plan rests or is any of a family, and h is free of t or periodic; `period`: the period
+    of h, in s; `domain`: the safe set, [lower, upper] by state; `uncertainty`: the h of the specification, whatever
+    obeys the declared bounds, or either; `parameters`: each constant, anywhere in [lower, upper].
+    """
 
     id: Literal["tube"]
     horizon: str | None
@@ -192,7 +213,9 @@ class Claimed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Overrides:
-    """What the command line changed; `settings`: keys of the specification, with the texts of their values (--set)."""
+    """What the command line changed; `settings`: keys of the specification, with the texts of their values (--set);
+    `conditions`: which certificate decides; `metric`: the name of the file of a metric.
+    """
 
     rho_a: Fraction | None = None
     epsilon: Fraction | None = None
@@ -205,8 +228,7 @@ class Overrides:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """What bounded the work: the relative width at which a constant is sharp enough, and boxes per claim.
-
+    """What bounded the work; `gap`: the relative width at which a constant is sharp enough; `budget`: boxes per claim;
     `gaps`: the widths of constants that have one of their own, by name.
     """
 
@@ -217,7 +239,10 @@ class Work:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnotTexts:
-    """Exact knots as texts: times (K,), states (K, n), inputs (K, m) or one row less."""
+    """Exact knots as texts; `t`: times (K,); `x`: states (K, n); `u`: inputs (K, m) or one row less.
+
+    With hermite-simpson every second row is a point between two knots, of which u counts and x does not.
+    """
 
     t: tuple[str, ...]
     x: tuple[tuple[str, ...], ...]
@@ -226,7 +251,7 @@ class KnotTexts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Samples:
-    """Points of the plan, to draw it: times (K,) and states (K, n)."""
+    """Points of the plan, to draw it; `t`: times (K,); `x`: states (K, n)."""
 
     t: tuple[float, ...]
     x: tuple[tuple[float, ...], ...]
@@ -234,7 +259,11 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanData:
-    """The plan as it was certified: `exact` expressions, or knots with the rule that fills the gaps."""
+    """The plan as it was certified: `exact` expressions, or knots with the rule that fills the gaps.
+
+    `kind`: as specified; `interpolation`: what u* does between knots; `curve`: what x* does there: the cubic whose
+    slopes at its ends are f(x*) + B(x*) u*; `file`: the plan file; `file_hash`: the hash of its bytes.
+    """
 
     kind: PlanKind
     interpolation: Literal["exact", "hold", "linear", "hermite-simpson"] | None = None
@@ -255,7 +284,7 @@ class PlanData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Geodesics:
-    """The test for unique geodesics: `value` encloses G rho + L_G rho^2/8, unique below 1."""
+    """The test for unique geodesics; `value`: encloses G rho + L_G rho^2/8; `holds`: this is below 1."""
 
     value: Constant
     holds: bool
@@ -263,7 +292,12 @@ class Geodesics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricData:
-    """The metric, what C1-C3 on the safe set tell of it, and its bounds over the tube."""
+    """The metric, what C1-C3 on the safe set tell of it, and its bounds over the tube.
+
+    `dual_metric`: W(x), by rows; `verdict`: whether C1-C3 hold on the safe set; `margin`: the extra rate, in 1/s, that
+    C2 supports; `largest_rate`: the largest that C2 supports, in 1/s; `lower` and `upper`: eigenvalues of M over the
+    tube, of S^-T M S^-1 with its coordinates S; `lower_on_set` and `upper_on_set`: eigenvalues of M on the safe set.
+    """
 
     rate: Fraction
     dual_metric: tuple[tuple[str, ...], ...]
@@ -279,10 +313,11 @@ class MetricData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TubeData:
-    """The radii; `rho_r` and the half-widths, by state and output, once the tube is proven to lie in the safe set.
+    """The radii, and the half-widths once the tube is proven to lie in the safe set.
 
-    `coordinates` S, by rows, exact: then the radii are lengths in z = S x, and the tube is |S (x - x*)| <= rho cut to
-    the half-widths.
+    `rho_r`: the radius rho - rho_a; `half_widths`: bounds of |x_i - x_i*|, and of |c'(x - x*)| for outputs;
+    `coordinates`: S by rows, exact: radii are lengths in z = S x, and the tube is |S (x - x*)| <= rho cut to the
+    half-widths.
     """
 
     epsilon: Fraction
@@ -295,7 +330,9 @@ class TubeData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bound:
-    """A constant over the tube, enclosed; None where no bound was found. `at` is where it is attained."""
+    """A constant over the tube; `below`: proven below; `above`: proven above, null where no bound was found; `symbol`:
+    how it is written; `equation`: where it is defined; `unit`: its unit, in those of states x, inputs u, distance d.
+    """
 
     below: float | None
     above: float | None
@@ -324,8 +361,10 @@ class Recipes:
 class Result:
     """What was found: a pure function of the specification and the options; what of it claims nothing is in `notes`.
 
-    What was not reached is None or empty. `sections` are those of the kinds, by their names; those in `decided_by`
-    decide the verdict.
+    What was not reached is None or empty. `verdict`: only certified says that the tube holds; `decided_by`: the kinds
+    that decide the verdict; `reasons`: why the verdict is what it is; `safe_set`: [lower, upper] by state;
+    `assumptions`: all that is assumed and not proven; `declared`: bounds of h that are believed, not proven;
+    `elasticities`: per cent of Gamma per per cent of a constant, by section.
     """
 
     verdict: Verdict
@@ -396,7 +435,7 @@ class Result:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """How it was made; not hashed."""
+    """How it was made; `command`: its line; `started`: when; `seconds`: how long; `versions`: of what it rests on."""
 
     command: str | None = None
     started: str | None = None
@@ -437,7 +476,9 @@ class Certificate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricFile:
-    """W and its rate in 1/s; on `verified_on`, lower I <= M <= upper I, and C2 holds with `margin` in 1/s to spare."""
+    """W and its rate in 1/s; on `verified_on`, `lower` I <= M <= `upper` I and C2 has `margin` in 1/s to spare;
+    `condition_number`: upper/lower.
+    """
 
     format: str
     rate: Fraction

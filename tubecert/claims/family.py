@@ -51,7 +51,7 @@ class Member:
 
 
 class Claim(Member, Tagged):
-    """Something that is proven, refuted or left undecided; `name` is what it is called."""
+    """Something that is proven, refuted or left undecided; `name`: what it is called."""
 
     __slots__ = ()
     key: ClassVar[str] = "claim"
@@ -95,7 +95,7 @@ def plain(module: str, family: type[M], name: str, says: str) -> type[M]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reason:
-    """A claim, what is known of it, a point that shows it, and what would help."""
+    """A claim, whose members stand beside these; `at`: a point that shows it; `relax`: what would help."""
 
     claim: Claim = field(metadata=INLINE)
     verdict: Verdict

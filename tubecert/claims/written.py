@@ -15,6 +15,8 @@ def _place_json(at: Witness) -> Json:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Place:
+    """Where a value is attained or a claim fails; `x`: the state; `t`: the time in s, if it matters."""
+
     x: tuple[float, ...]
     t: float | None = None
 
