@@ -17,6 +17,7 @@ import numpy as np
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
 from tubecert.enclosure.branch_and_bound import Effort
+from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.expression.matrix import identity
 from tubecert.loop_design.design import Design, NoDesign, design, refuse_unmoved
@@ -35,6 +36,7 @@ from tubecert.verdict import Verdict
 
 _WINDOWS: Final = 256
 _DEFECT: Final = 1e-6  # of the safe set in a second: what of a plan's defect is of rounding alone
+_TRIES: Final = 4  # designs with ever less room, where a proof needs more than floats
 
 
 def certify(spec: Spec, report: Progress | None = None) -> Certificate:
@@ -84,23 +86,35 @@ def _knots(spec: Spec, model: ControlAffineModel, report: Progress | None) -> Kn
 
 
 def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, Notes]:
-    """Tables, stages and what is proven of them."""
-    loop, plain = remainders.loop, _result(remainders.loop)
-    try:
-        found = _tables(remainders, report)
-        inequalities, stages = propose(remainders, found.tables, _told(report, "tube"))
-    except NoDesign as error:
-        names = loop.model.inputs if error.kind == "inputs" else loop.model.states
-        where = "" if error.where is None else names[error.where]
-        lack = Lack(kind=error.kind, where=where, needed=error.needed, allowed=error.allowed)
-        if error.kind == "no_fixed_point" and error.where is not None and error.allowed is not None:
-            beyond = error.allowed - float(space_of(remainders)[error.where])  # without what is not linear
-            lack = lack if beyond < 0 else Lack(kind="safe_set", where=where, needed=beyond)
-        missed = (remainders.defect > _DEFECT * space_of(remainders)).any()
-        return replace(plain, lacks=(lack,)), Notes(missed=fitting(loop) if missed else None)
-    checked = check(loop, found.tables, stages, inequalities.recipe)
-    proposed = replace(plain, controller=found.tables, tube=stages, recipe=inequalities.recipe)
-    return replace(proposed, **checked._asdict()), explain(inequalities, stages, found.evaluations)
+    """Tables, stages and what is proven of them; with less room for the inputs where the proof finds too little."""
+    loop = remainders.loop
+    plain, narrow = _result(loop), np.ones(loop.inputs)
+    for _ in range(_TRIES):
+        try:
+            found = _tables(remainders, narrow, report)
+            inequalities, stages = propose(remainders, found.tables, _told(report, "tube"))
+        except NoDesign as error:
+            names = loop.model.inputs if error.kind == "inputs" else loop.model.states
+            where = "" if error.where is None else names[error.where]
+            lack = Lack(kind=error.kind, where=where, needed=error.needed, allowed=error.allowed)
+            if error.kind == "no_fixed_point" and error.where is not None and error.allowed is not None:
+                beyond = error.allowed - float(
+                    space_of(remainders)[error.where]
+                )  # without what is not linear
+                lack = lack if beyond < 0 else Lack(kind="safe_set", where=where, needed=beyond)
+            missed = (remainders.defect > _DEFECT * space_of(remainders)).any()
+            return replace(plain, lacks=(lack,)), Notes(missed=fitting(loop) if missed else None)
+        checked = check(loop, found.tables, stages, inequalities.recipe)
+        over = {lack.where: lack for lack in checked.lacks if lack.kind == "inputs"}
+        proposed = replace(plain, controller=found.tables, tube=stages, recipe=inequalities.recipe)
+        result = replace(proposed, **checked._asdict())
+        if not over or loop.spec.controller == "none":
+            break
+        narrow *= [
+            0.98 * own.allowed / own.needed if (own := over.get(name)) and own.allowed and own.needed else 1.0
+            for name in loop.model.inputs
+        ]
+    return result, explain(inequalities, stages, found.evaluations)
 
 
 def _hopeless(remainders: Remainders) -> Iterator[Lack]:
@@ -124,11 +138,11 @@ def _told(report: Progress | None, name: str) -> Callable[[int, object], None] |
     return lambda count, _: report(Step(phase=Phase.LOOP, name=name, count=count, unit=Unit.STEPS))
 
 
-def _tables(remainders: Remainders, report: Progress | None) -> Design:
+def _tables(remainders: Remainders, narrow: Array, report: Progress | None) -> Design:
     """What is designed; no controller has tables of nothing, and for ever every mode has to die away."""
     loop = remainders.loop
     if loop.spec.controller != "none":
-        return design(plant_of(remainders), _told(report, "controller"))
+        return design(plant_of(remainders, narrow), _told(report, "controller"))
     n, m = loop.states, loop.inputs
     if loop.horizon is None:
         half = np.array([float(high - low) / 2 for low, high in loop.spec.safe_set])

@@ -1,15 +1,15 @@
 """The search for the weights whose tables keep the tube small, and the tables; or why none were found.
 
-In: a plant. Out: a `Design`. A pattern search on the logarithms of all weights, for the geometric mean of the fixed
-point's widths, which needs no reference; inputs, the safe set and what is wished are its limits. Trusted: no; nothing
-is proven by what is said to be missing either.
+In: a plant. Out: a `Design`. A pattern search on the logarithms of all weights, first for the geometric mean of the
+widths without remainders, which needs no reference, then for the largest of the fixed point's widths with them,
+relative to the first or to what is wished. Trusted: no; nothing is proven by what is said to be missing either.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import null_space, orth
@@ -20,19 +20,21 @@ from tubecert.loop_design.plant import Plant, in_units
 from tubecert.loop_design.widths import STILL, Response, respond, rest_at, settle, sizes, spread
 from tubecert.sampled_loop.record import Tables
 
-FACTORS = (10.0, 3.0, 1.7, 3.0, 1.7, 1.3, 1.7, 1.3)  # on a weight
+COARSE = (10.0, 3.0)  # factors on groups of weights
+FINE = (3.0, 1.7, 3.0, 1.7, 1.3)  # on groups and on single weights
 GAIN = 1e-3  # what a step must gain
 STEPS, MANY = 24, 400  # of the fixed point in a search, and at the end
 SPARE = 1.1  # times the remainder has a fixed point there: a proof does not find those that barely exist
 UNSTABLE, OPEN = 1e9, 1e3  # what loops count that are not stable, or have no tube
-ROOM = 0.95  # of an input, a wish and the safe set may be used without a price: rigorous bounds are a little wider
-DEAR = 100.0  # what an input costs that needs twice its room: beyond it there is no certificate
+ROOM = 0.95  # of an input may be used without a price: rigorous bounds are a little wider
 FREE = 0.05  # what an input that nothing limits counts, beside the widths
 SLOW = 0.03  # what lags count: twice as many must make the tube 2 % smaller
-LONG = 3000  # lags, and more cost every state in proportion: they take long to prove
-BRIEF = 100  # the same where nothing pushes: all that a loop has to do is to return
+LONG = 3000  # lags, and more cost in proportion: they take long to prove
 SEEN = 2.0  # times the noise of a state: to know it better than that is worth nothing
 LATER = 1.0  # what the long run counts beside the tube for ever, where the start makes them differ
+GROWN = 10.0  # times its width without remainders is the most that a state is compared with
+WISH = 0.9  # of a half-width that is wished is aimed at
+UNASKED = 2.0  # times its first half-width is what a state may have for another one's wish
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,18 +77,23 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
         raise NoDesign("no_design")
     refuse_unmoved(own.A, own.B)
     search = _Search(observe(own), report or (lambda evaluations, value: None))
-    if (reached := search.reach(search.best())) is None:
+    weights = search.found()
+    if (reached := search.response(weights)) is None:
         raise NoDesign("no_design")
-    first, needed = np.split(reached.alone * np.r_[s, u], [len(s)])
+    theta, response = reached
+    alone = sizes(own, response.ever + response.gain @ search.constant)
+    needed = alone[len(s) :] * u
     if (needed > plant.room).any():
         j = int(np.argmax(needed - plant.room))
         raise NoDesign("inputs", j, float(needed[j]), float(plant.room[j]))
-    size, moved = settle(own, reached.response.gain, reached.response.ever, MANY)
-    W, U = np.split(size * np.r_[s, u], [len(s)])
-    if moved > STILL and not plant.start.any():  # after a start the remainder falls
+    size, moved = settle(own, response.gain, response.ever, MANY)
+    (W, U), first = np.split(size * np.r_[s, u], [len(s)]), alone[: len(s)] * s
+    if (
+        moved > STILL and not plant.start.any()
+    ):  # one that falls after a start has a smaller remainder than at first
         worst = int(np.argmax(W / first))
         raise NoDesign("no_fixed_point", worst, float(W[worst]), float(first[worst]))
-    (n, m), table = plant.B.shape, search.observer.rounded(reached.theta)
+    (n, m), table = plant.B.shape, search.observer.rounded(theta)
     tables = Tables(table[m:, n:], table[m:, :n], table[:m, n:], table[:m, :n])
     return Design(tables, np.maximum(W, plant.start), U, evaluations=search.evaluations)
 
@@ -121,79 +128,129 @@ def _refuse_unheld(plant: Plant) -> None:
                 raise NoDesign("inputs", j, float(plant.room[j] * needed / strength), float(plant.room[j]))
 
 
-class _Reached(NamedTuple):
-    """A controller and how far its loop is driven, (n + m,): `alone` without what grows with the tube, `ever`, `late`.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reached:
+    """How far a loop is driven: W for ever and in the long run (2, n), U (m,).
 
-    `grows`: by which factor that widens the tube ever more; 0 where it may close.
+    `grows`: by which factor what is not linear widens a tube ever more; 0 where it may close.
     """
 
-    theta: Array
-    response: Response
-    alone: Array
-    ever: Array
-    late: Array
+    lags: float
+    W: Array
+    U: Array
     grows: float = 0.0
 
 
 class _Search:
-    """Hooke and Jeeves on the weights of one observer."""
+    """Hooke and Jeeves on the weights of one observer: first without, then with what grows with the tube."""
 
     def __init__(self, observer: Observer, report: Callable[[int, float], None]) -> None:
         self.observer, self.report = observer, report
         self.plant = plant = observer.plant
-        self.evaluations, self.n = 0, len(plant.A)
+        self.evaluations = 0
+        self.n = len(plant.A)
         self.constant = rest_at(plant, np.zeros(sum(plant.B.shape)))
         self.counts = np.array([1.0, LATER if plant.start.any() or plant.eta_start.any() else 0.0]) / self.n
         self.least = np.maximum(SEEN * plant.noise, 1e-30)
-        self.most = np.minimum(plant.space, plant.wishes)
-        self.long = LONG if plant.magnitude.any() or plant.E.any() else BRIEF
+        self.reference: Array | None = None
+        self.most = np.full((0, self.n), np.inf)  # of W for ever, once wishes are met
+        sorts, many = np.repeat(range(6), observer.sizes()), np.repeat(observer.sizes(), observer.sizes())
+        self.groups = np.array([1.0 * (sorts == sort) for sort in (1, 2, 3, 4)])
+        self.singles = np.eye(len(sorts))[(many > 1) | (sorts == 0) | (sorts == 5)]
 
-    def reach(self, weights: Array) -> _Reached | None:
-        """How far the loop of these weights is driven, None if it is not stable.
+    def found(self) -> Array:
+        """The best weights: without remainders, with them, and where wishes are met still narrower."""
+        weights, wished = self.run(self.within()), np.isfinite(self.plant.wishes)
+        alone, grown = self.reach(weights), self.reach(weights, STEPS)
+        if alone is None or grown is None or not (wished.any() or (grown.W > (1 + 1e-4) * alone.W).any()):
+            return weights
+        first = np.minimum(grown.W, GROWN * alone.W) * (UNASKED if wished.any() else 1.0)
+        self.reference = np.maximum(first, self.least)
+        self.reference[:, wished] = WISH * self.plant.wishes[wished]
+        weights = self.run(weights)
+        if not self.meets_wishes(weights):
+            weights = min(weights, self.run(self.within()), key=self.value)
+        if not wished.any() or not self.meets_wishes(weights):
+            return weights
+        self.reference, self.most = None, self.plant.wishes[None]
+        return self.run(weights, FINE[1:2])
+
+    def within(self) -> Array:
+        """First weights: inputs grow dear, and eta slow, until no input leaves its room."""
+        weights = np.zeros(self.groups.shape[1])
+        for _ in range(8):
+            reached = self.reach(weights)
+            if reached and (self.plant.room >= reached.U).all():
+                break
+            weights = weights + np.log(10) * np.array([1, 1, -1, 0]) @ self.groups
+        return weights
+
+    def meets_wishes(self, weights: Array) -> bool:
+        """Whether the tube of these weights is as narrow as wished, and not wider than the safe set."""
+        reached, most = self.reach(weights, STEPS), np.minimum(self.plant.wishes, self.plant.space)
+        return reached is not None and not reached.grows and bool((most >= reached.W).all())
+
+    def response(self, weights: Array) -> tuple[Array, Response] | None:
+        """Theta of these weights and what it answers; None if the loop is not stable."""
+        self.evaluations += 1
+        theta = self.observer.table(weights)
+        response = None if theta is None else respond(self.plant, self.observer.sample, theta)
+        return None if theta is None or response is None else (theta, response)
+
+    def reach(self, weights: Array, steps: int = 0) -> _Reached | None:
+        """How far the loop of these weights is driven; without `steps` no remainder grows.
 
         A tube falls after a start: for ever it has half the remainder of its beginning, half that of its long run.
         """
-        self.evaluations += 1
-        plant, theta = self.plant, self.observer.table(weights)
-        response = None if theta is None else respond(plant, self.observer.sample, theta)
-        if theta is None or response is None:
+        if (found := self.response(weights)) is None:
             return None
-        alone, gain = sizes(plant, response.ever + response.gain @ self.constant), SPARE * response.gain
-        late, moved = settle(plant, gain, response.long_run, STEPS)
+        response, plant, n = found[1], self.plant, self.n
+        known = response.gain @ self.constant
+        alone, late = (sizes(plant, rows + known) for rows in (response.ever, response.long_run))
+        if not steps:
+            return _Reached(response.lags, np.array([alone, late])[:, :n], alone[n:])
+        gain = SPARE * response.gain
+        late, moved = settle(plant, gain, response.long_run, steps)
         if not np.isfinite(moved):
-            return _Reached(theta, response, alone, alone, late, spread(plant, gain, alone))
+            return _Reached(
+                response.lags, np.array([late, late])[:, :n], alone[n:], spread(plant, gain, alone)
+            )
         rest = rest_at(plant, late)
-        first = rest_at(plant, sizes(plant, response.ever + gain @ rest))
-        ever = sizes(plant, response.ever + gain @ (0.5 * rest + 0.5 * first))
-        return _Reached(theta, response, alone, ever, late)
+        first = sizes(plant, response.ever + gain @ rest)
+        ever = sizes(plant, response.ever + gain @ (0.5 * rest + 0.5 * rest_at(plant, first)))
+        return _Reached(response.lags, np.array([ever, late])[:, :n], ever[n:])
 
     def value(self, weights: Array) -> float:
         """What the search makes small, a logarithm.
 
-        The geometric mean of the widths; larger where inputs or the tube leave their room, or inputs cost nothing, and
-        for loops that forget slowly. Where no tube closes, by which factor it grows.
+        The geometric mean of the widths or, with a reference, their 8-norm relative to it; larger where inputs or the
+        tube leave their room, or inputs cost nothing, and for loops that forget slowly. Where no tube closes, by which
+        factor it grows.
         """
-        if (reached := self.reach(weights)) is None:
+        steps = STEPS if self.reference is not None or len(self.most) else 0
+        if (reached := self.reach(weights, steps)) is None:
             return UNSTABLE
-        plant, lags = self.plant, reached.response.lags
-        W, U = np.split(reached.ever, [self.n])
+        W, plant = reached.W, self.plant
+        used = [reached.U / plant.room, W[0] / plant.space, (W[0] / self.most).ravel()]
         if reached.grows:
-            value = OPEN + np.log(reached.grows)
+            value, used = OPEN + np.log(reached.grows), used[:1]
+        elif self.reference is None:
+            value = self.counts @ np.log(np.maximum(W, self.least)).sum(axis=1)
         else:
-            over = np.maximum(0.0, W / self.most - ROOM)
-            both = np.maximum([W, reached.late[: self.n]], self.least)
-            value = self.counts @ np.log(both).sum(axis=1) + np.log1p(5 * over + 50 * over**2).sum()
-        value += DEAR * np.maximum(0.0, U / plant.room - ROOM).sum()
-        value += FREE * np.log(np.maximum(U[np.isinf(plant.room)], 1e-9)).sum()
-        return float(value + SLOW * np.log(lags) + self.n * np.log(max(1.0, lags / self.long)))
+            value = np.log(self.counts @ ((W / self.reference) ** 8).sum(axis=1)) / 8
+        over = np.maximum(0.0, np.concatenate(used) - ROOM)
+        free = FREE * np.log(np.maximum(reached.U[np.isinf(plant.room)], 1e-9)).sum()
+        forgets = SLOW * np.log(reached.lags) + np.log(max(1.0, reached.lags / LONG))
+        return float(value + np.log1p(5 * over + 50 * over**2).sum() + free + forgets)
 
-    def best(self) -> Array:
-        """From plain weights along every one while that gains, then along the whole sweep once more."""
-        weights = np.zeros(sum(self.observer.sizes()))
+    def run(self, weights: Array, fine: Sequence[float] = FINE) -> Array:
+        """Along every direction while that gains, then along the whole sweep once more."""
         best = self.value(weights)
-        for factor in FACTORS:
+        single = np.concatenate([self.groups, self.singles])
+        sweeps = [(factor, self.groups) for factor in COARSE] + [(factor, single) for factor in fine]
+        for factor, directions in sweeps:
             origin = weights
-            for direction in np.eye(len(weights)):
+            for direction in directions:
                 for move in (np.log(factor) * direction, -np.log(factor) * direction):
                     before, (weights, best) = best, self._along(move, weights, best)
                     if best < before:

@@ -21,7 +21,6 @@ _FEW: Final = 48  # windows for a search
 _SHARE: Final = 0.1  # of the safe set: where the remainder is fitted
 _ROOM: Final = 1.0  # of an input without limits, there
 _HORIZON: Final = 3.0  # sample times and delays after which a signal's effect is the unit of a state
-_DOUBLED: Final = 10  # times at most, until inputs can undo a start
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,10 +55,10 @@ class Plant:
     units: tuple[Array, Array, Array]
 
 
-def plant_of(remainders: Remainders) -> Plant:
-    """The error equation in floats."""
+def plant_of(remainders: Remainders, narrow: Array) -> Plant:
+    """The error equation in floats, with `narrow` (m,) of the room that the inputs have."""
     loop, winds, space = remainders.loop, remainders.loop.sudden, space_of(remainders)
-    room = np.maximum(remainders.room, 0.0)
+    room = np.where(remainders.room > 0, remainders.room * narrow, 0.0)
     sizes, asked = remainders.sizes(np.zeros(loop.states)), dict(loop.spec.tube.half_widths)
     pushed = np.max(np.abs(loop.H) / space[:, None], axis=0, initial=0.0) * sizes.size
     acts = 1.0 * (pushed > CLEAN)  # on the safe set, in a second
@@ -134,19 +133,13 @@ def in_units(plant: Plant) -> Plant:
 
     These are not finite where too much happens within a sample.
     """
-    horizon, room = _HORIZON * (plant.sample_time + plant.delay), np.minimum(plant.room, 1 / _QUIET)
+    horizon = _HORIZON * (plant.sample_time + plant.delay)
+    turned = np.where(plant.rate > 0, np.minimum(plant.magnitude, plant.rate * horizon), plant.magnitude)
+    a = np.where(turned > 0, turned, 1.0)
+    columns = np.hstack([plant.H * a, plant.E, plant.B])
     with np.errstate(all="ignore"):
-        for _ in range(_DOUBLED):
-            turned = np.where(
-                plant.rate > 0, np.minimum(plant.magnitude, plant.rate * horizon), plant.magnitude
-            )
-            a = np.where(turned > 0, turned, 1.0)
-            columns = np.hstack([plant.H * a, plant.E, plant.B])
-            pushed = np.max([np.abs(flow(plant.A, columns, horizon * i / 8)[1]) for i in range(1, 9)], axis=0)
-            signals, moved = np.split(pushed, [-plant.B.shape[1]], axis=1)
-            if not ((plant.start > moved @ room) & (moved > 0).any(axis=1)).any():
-                break
-            horizon *= 2
+        pushed = np.max([np.abs(flow(plant.A, columns, horizon * i / 8)[1]) for i in range(1, 9)], axis=0)
+        signals, moved = np.split(pushed, [-plant.B.shape[1]], axis=1)
         s = np.max([signals.sum(axis=1), plant.noise, plant.start], axis=0)
         s = np.where(s > _QUIET, s, 0.0)
         answers = (moved / np.where(s > 0, s, np.inf)[:, None]).max(axis=0)
