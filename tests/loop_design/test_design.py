@@ -286,3 +286,22 @@ def test_a_wind_that_is_too_strong_is_not_told_as_what_is_not_linear():
     (lack,) = certify(load_text(LAG.replace("bound: 0.01", "bound: 40") + "controller: none\n")).result.lacks
     assert (lack.kind, lack.where) == ("safe_set", "x")
     assert lack.needed == pytest.approx(1, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [10, 100])
+def test_where_only_a_start_acts_the_loop_returns_about_as_fast_as_its_input_can(rate):
+    """1 m with at most 1 m/s^2: 2 s. It took 500: a slow loop has a narrow v, whose unit was what 3 samples do."""
+    text = f"""tubecert: 1
+name: cart
+system: {{states: [x, v], inputs: [u], f: [v, 0], B: [[0], [1]]}}
+safe_set: {{x: [-10, 10], v: [-10, 10]}}
+trajectory: {{kind: equilibrium, at: [0, 0]}}
+initial_state: {{box: {{x: [-1, 1], v: [0, 0]}}}}
+hardware: {{rate: {rate}}}
+limits: {{u: [-1, 1]}}
+"""
+    result = certify(load_text(text, "cart.yaml")).result
+    assert result.verdict == "certified"
+    assert result.tube[-1].start <= 25 * rate
+    assert result.tube[-1].half_widths["x"] < 0.01

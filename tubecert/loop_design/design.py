@@ -30,6 +30,7 @@ ROOM = 0.95  # of an input may be used without a price: rigorous bounds are a li
 FREE = 0.05  # what an input that nothing limits counts, beside the widths
 SLOW = 0.03  # what lags count: twice as many must make the tube 2 % smaller
 LONG = 3000  # lags, and more cost in proportion: they take long to prove
+BRIEF = 100  # the same where nothing pushes, of every state: all that a loop has to do is to return
 SEEN = 2.0  # times the noise of a state: to know it better than that is worth nothing
 LATER = 1.0  # what the long run counts beside the tube for ever, where the start makes them differ
 GROWN = 10.0  # times its width without remainders is the most that a state is compared with
@@ -240,7 +241,8 @@ class _Search:
             value = np.log(self.counts @ ((W / self.reference) ** 8).sum(axis=1)) / 8
         over = np.maximum(0.0, np.concatenate(used) - ROOM)
         free = FREE * np.log(np.maximum(reached.U[np.isinf(plant.room)], 1e-9)).sum()
-        forgets = SLOW * np.log(reached.lags) + np.log(max(1.0, reached.lags / LONG))
+        most, states = (LONG, 1) if plant.magnitude.any() or plant.E.any() else (BRIEF, self.n)
+        forgets = SLOW * np.log(reached.lags) + states * np.log(max(1.0, reached.lags / most))
         return float(value + np.log1p(5 * over + 50 * over**2).sum() + free + forgets)
 
     def run(self, weights: Array, fine: Sequence[float] = FINE) -> Array:

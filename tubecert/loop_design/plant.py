@@ -20,6 +20,7 @@ _QUIET: Final = 1e-300  # what is smaller is a 0 that was rounded outward
 _FEW: Final = 48  # windows for a search
 _SHARE: Final = 0.1  # of the safe set: where the remainder is fitted
 _ROOM: Final = 1.0  # of an input without limits, there
+_DOUBLED: Final = 10  # times at most, until inputs can undo a start
 _HORIZON: Final = 3.0  # sample times and delays after which a signal's effect is the unit of a state
 
 
@@ -133,13 +134,17 @@ def in_units(plant: Plant) -> Plant:
 
     These are not finite where too much happens within a sample.
     """
-    horizon = _HORIZON * (plant.sample_time + plant.delay)
-    turned = np.where(plant.rate > 0, np.minimum(plant.magnitude, plant.rate * horizon), plant.magnitude)
-    a = np.where(turned > 0, turned, 1.0)
-    columns = np.hstack([plant.H * a, plant.E, plant.B])
+    horizon, room = _HORIZON * (plant.sample_time + plant.delay), np.minimum(plant.room, 1 / _QUIET)
     with np.errstate(all="ignore"):
-        pushed = np.max([np.abs(flow(plant.A, columns, horizon * i / 8)[1]) for i in range(1, 9)], axis=0)
-        signals, moved = np.split(pushed, [-plant.B.shape[1]], axis=1)
+        for _ in range(_DOUBLED):
+            most = np.where(plant.rate > 0, plant.rate * horizon, np.inf)
+            a = np.where(plant.magnitude > 0, np.minimum(plant.magnitude, most), 1.0)
+            columns = np.hstack([plant.H * a, plant.E, plant.B])
+            pushed = np.max([np.abs(flow(plant.A, columns, horizon * i / 8)[1]) for i in range(1, 9)], axis=0)
+            signals, moved = np.split(pushed, [-plant.B.shape[1]], axis=1)
+            if not ((plant.start > moved @ room) & (moved > 0).any(axis=1)).any():
+                break
+            horizon *= 2
         s = np.max([signals.sum(axis=1), plant.noise, plant.start], axis=0)
         s = np.where(s > _QUIET, s, 0.0)
         answers = (moved / np.where(s > 0, s, np.inf)[:, None]).max(axis=0)
