@@ -25,7 +25,9 @@ from tubecert import pipeline, spec
 from tubecert.errors import ExitCode, TubecertError
 from tubecert.model import ControlAffineModel
 from tubecert.recheck.constants import OVER_TUBE, bounded
-from tubecert.recheck.run import recheck
+from tubecert.recheck.cover import stated
+from tubecert.recheck.run import Examined, Recheck, recheck
+from tubecert.report.rechecked import page_of
 
 CONFIGS = [
     path
@@ -225,6 +227,12 @@ def test_what_is_no_certificate_is_named(text, code):
         recheck(text, "file.json")
     assert raised.value.exit_code == ExitCode.INVALID
     assert raised.value.findings[0].code == code
+
+
+def test_a_claim_is_one_line_whatever_its_name_holds():
+    claim = Examined("c\nd", stated(False, "e\nf"))
+    page = repr(page_of(Recheck(stated="certified", hash="a\nb", claims=(claim,), unread=()), "file"))
+    assert page.count(r"\\n") == page.count(r"\n") == 5
 
 
 OTHERS = {

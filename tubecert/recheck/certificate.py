@@ -38,6 +38,7 @@ from tubecert.recheck.specified.trajectory import read_start
 NOT_HASHED = ("notes", "run")
 """Members of a certificate beside its result: what they say is not examined."""
 
+_ALWAYS = ("spec", "claim", "overrides", "plan", "safe_set", "assumptions", "declared", "reasons", "proof")
 _PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*|\[\d{1,6}\])*", re.ASCII)
 _PART = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]", re.ASCII)
 
@@ -55,25 +56,13 @@ def read_result(node: Node) -> Result:
 
     Raises `CertificateError` for whatever is not of its form.
     """
-    own = node.closed(
-        "verdict",
-        "spec",
-        "claim",
-        "overrides",
-        "plan",
-        "safe_set",
-        "assumptions",
-        "declared",
-        "reasons",
-        "proof",
-        optional=("synthesis", "metric", "clearance", "inputs", "constants", "tube", *KEYS, "decided_by"),
-    )
+    last = ("constants", "tube", *KEYS, "decided_by")
+    own = node.closed("verdict", *_ALWAYS, optional=("synthesis", "metric", "clearance", "inputs", *last))
     verdict = own["verdict"].word(*VERDICTS)
     spec = own["spec"].closed("effective", "effective_hash", "file_hash")
     spec["file_hash"].text()
     specification = read_specification(spec["effective"])
     states = specification.plant.states
-    last = ("constants", "tube", *KEYS, "decided_by")
     searched = any(key in own for key in last[2:])
     if verdict == "certified" or searched:  # the search comes last: everything else must be there
         own.require("metric", *last)

@@ -111,6 +111,8 @@ def _turns_back(a: Point, b: Point, c: Point) -> bool:
 def _touch(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
     """Whether two edges have a point in common."""
     (a, b), (c, d) = one, other
+    if any(max(a[k], b[k]) < min(c[k], d[k]) or max(c[k], d[k]) < min(a[k], b[k]) for k in (0, 1)):
+        return False  # as nearly all are: this takes a tenth of what follows
     sides = _area(a, b, c), _area(a, b, d), _area(c, d, a), _area(c, d, b)
     if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
         return True
