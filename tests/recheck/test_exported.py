@@ -197,6 +197,12 @@ def test_the_command_tells_the_claims(tmp_path, monkeypatch):
     assert run("export", "cart.certificate.json", "-o", "c").exit_code == 0
     done = run("recheck", "cart.certificate.json", "--controller", "c", "-v")
     assert re.search("confirmed +controller: the plan is that of the certificate", done.output)
+    assert re.search("confirmed .*", done.output)[0].split()[1] == "controller:", (
+        "what was asked for comes first"
+    )
+    done = run("recheck", "cart.certificate.json", "--controller", "nofolder")
+    assert done.exit_code == 2
+    assert "TC100: cannot read 'nofolder': no such file or directory" in done.output
     (tmp_path / "c" / "selftest.c").write_text("")
     done = run("recheck", "cart.certificate.json", "--controller", "c")
     assert done.exit_code == 1

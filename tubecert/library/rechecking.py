@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 from tubecert import asking
 from tubecert.asking import Number
 from tubecert.certificate.file import FORMAT, KIND, incomplete, parse, unreadable
-from tubecert.errors import ExitCode
+from tubecert.errors import ExitCode, TargetError
 from tubecert.files import STDIN, read, read_stdin
+from tubecert.findings import Finding
 from tubecert.library.shown import Shown
-from tubecert.printable import json_text
+from tubecert.printable import json_text, visible
 from tubecert.progress import Phase, Progress, Step
 from tubecert.recheck import document
 from tubecert.recheck.certificate import opened, read_result
@@ -114,7 +115,7 @@ def recheck(
     `result`: the certificate, or its file. `spec`: also that it is of this specification (else TC604 is raised).
     `budget`: boxes per claim before giving up; what is not proven `deadline` s from now is undecided. `controller`: a
     folder that `export` wrote, whose code and numbers are compared with the certificate of a sampled loop. Raises
-    `TubecertError` for what is no certificate.
+    `TubecertError` for what is no certificate, and for a folder that cannot be read.
     """
     if isinstance(text := getattr(result, "text", None), str):
         name = str(getattr(result, "name", ""))
@@ -122,6 +123,8 @@ def recheck(
         name = asking.text_of("result", result)
         text = _text_of(name)
     note = "" if spec is None else _specified(text, name, spec)
+    if controller is not None:
+        _require_folder(os.fspath(controller))
     shown, line = timed(progress), asking.hears(progress, "found")
     found = examined(
         text,
@@ -168,7 +171,7 @@ def belongs(root: document.Node, name: str, spec: Specifiable) -> str:
 
 
 def _with_controller(found: Recheck, text: str, name: str, folder: str) -> Recheck:
-    """The same, with the claims of a folder of exported code.
+    """The same, after the claims of a folder of exported code: what was asked for is on the first screen.
 
     Raises `CertificateError` for the certificate of a loop in continuous time.
     """
@@ -179,7 +182,17 @@ def _with_controller(found: Recheck, text: str, name: str, folder: str) -> Reche
         help = f"leave {asking.named('controller')} out, or give the certificate of a specification with hardware"
         raise document.wrong("TC601", f"{name} is about a loop in continuous time, which has no code", help)
     more = (Examined(*each) for each in exported(own, folder))
-    return replace(found, claims=(*found.claims, *more))
+    return replace(found, claims=(*more, *found.claims))
+
+
+def _require_folder(folder: str) -> None:
+    """Raise `TargetError` for what is no folder that can be read: a name that is mistyped contradicts nothing."""
+    try:
+        os.scandir(folder).close()
+    except (OSError, ValueError) as error:
+        why = (getattr(error, "strerror", None) or str(error)).lower()
+        message, help = f"cannot read '{visible(folder)}': {why}", "give a folder that tubecert export wrote"
+        raise TargetError([Finding(code="TC100", message=message, help=help)]) from None
 
 
 def _text_of(name: str) -> str:
