@@ -169,8 +169,8 @@ def test_a_part_of_no_length_in_floats_has_a_window():
         Fraction(1),
     )
     u = ((Fraction(0),), (Fraction(0),), (Fraction(9),), (Fraction(0),), (Fraction(0),))
-    knots = Knots(t, ((Fraction(0),),) * 5, u, "linear")
-    own = course_of(asked(trajectory="{kind: ilqr, target: [0], horizon: 1}"), planned(asked(), knots))
+    given = asked(trajectory="{kind: ilqr, start: [0], target: [0], horizon: 1, goal: false}")
+    own = course_of(given, planned(given, Knots(t=t, x=((Fraction(0),),) * 5, u=u)))
     assert max(float(window.u[0].abs_upper()) for window in own.windows(8)) >= 9
 
 
