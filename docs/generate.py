@@ -332,6 +332,7 @@ _DECIMAL = {
     "type": ["number", "string"],
     "pattern": f"^({records._DECIMAL.pattern}|{records._QUOTIENT.pattern})$",
 }
+_NULL = {"type": "null"}
 _SPECIFICATION = {"description": "An effective specification.", "type": "object"}
 
 
@@ -339,6 +340,8 @@ def certificate() -> dict[str, Any]:
     """The schema of certificates, from their records and the words of these."""
     proven, noted = _parted(forms.schema(result.Result), NOTES)
     proven["properties"]["decided_by"]["items"] = {"enum": [kind.key for kind in KINDS]}
+    start = proven["properties"]["claim"]["properties"]["start"]
+    start["oneOf"] = [{"required": [key], "properties": {key: {"not": _NULL}}} for key in start["properties"]]
     asked = {
         "description": "`metric.synthesise` of the specification, or what the command line asked for.",
         "type": "object",
@@ -354,7 +357,6 @@ def certificate() -> dict[str, Any]:
         **{name: forms.family(kind) for name, kind in forms.FAMILIES.items()},
     }
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:tubecert:certificate:2",
         "title": "tubecert certificate",
         "description": "What `certify` writes, for every verdict. `recheck` reads these keys and no others: more keys "
@@ -373,7 +375,7 @@ def _parted(form: dict[str, Any], tree: Places) -> tuple[dict[str, Any], dict[st
             return {**form, key: stays}, {**form, key: told}
     if "anyOf" in form:
         stays, told = _parted(form["anyOf"][0], tree)
-        return {**form, "anyOf": [stays, {"type": "null"}]}, told
+        return {**form, "anyOf": [stays, _NULL]}, told
     own, noted = dict(form["properties"]), {}
     beside = [key for key in tree if key not in own]  # of members of a family
     for key, inner in tree.items():
@@ -419,7 +421,6 @@ def metric() -> dict[str, Any]:
     read = {"format": {"const": metric_file.FORMAT, "description": "Version of the format."}}
     read |= {key: used[key] for key in ("rate", "dual_metric")}
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:tubecert:metric:1",
         "title": "tubecert metric file",
         "description": "A dual metric with its rate, as `synth` writes it and `certify --metric` reads it. Only rate "
@@ -435,28 +436,19 @@ def metric() -> dict[str, Any]:
 def sampled_loop() -> dict[str, Any]:
     """The schema of certificates of sampled loops, from their records and the words of these."""
     row = {"type": "array", "items": {"type": "string", "description": "A float in hexadecimal."}}
-    matrix = {
+    entries = {
         "columns": {"type": "integer", "description": "How many."},
         "rows": {"type": "array", "items": row},
     }
-    matrix["rows"]["description"] = "Row by row, every number exact."
+    entries["rows"]["description"] = "Row by row, every number exact."
     proven, noted = forms.schema(of_samples.Result), forms.schema(of_samples.Notes)
+    matrix = {"description": "A matrix.", "type": "object", "required": [*entries], "properties": entries}
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:tubecert:sampled-loop:1",
         "title": "tubecert certificate of a sampled loop",
         "description": "What `certify` writes for a specification with `hardware`, for every verdict.",
         **_sealed(of_samples.FORMAT, proven, noted, {"type": "object"}),
-        "$defs": {
-            "decimal": _DECIMAL,
-            "specification": _SPECIFICATION,
-            "matrix": {
-                "description": "A matrix.",
-                "type": "object",
-                "required": [*matrix],
-                "properties": matrix,
-            },
-        },
+        "$defs": {"decimal": _DECIMAL, "specification": _SPECIFICATION, "matrix": matrix},
     }
 
 
@@ -465,7 +457,6 @@ def specification() -> dict[str, Any]:
     own = described_section(FILE)
     kinds = {f"trajectory_{kind}": described_section(section) for kind, section in PLANS.items()}
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "urn:tubecert:spec:1",
         "title": "tubecert specification",
         **own,
@@ -530,7 +521,9 @@ def _words(make: type) -> dict[str, str]:
 def schemas() -> dict[str, dict[str, Any]]:
     """Every schema by its name."""
     found = (specification(), metric(), certificate(), sampled_loop())
-    return dict(zip(("spec", "metric", "certificate", "sampled-loop"), found, strict=True))
+    names = ("spec", "metric", "certificate", "sampled-loop")
+    dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    return {name: dialect | schema for name, schema in zip(names, found, strict=True)}
 
 
 def everything() -> dict[str, str]:
