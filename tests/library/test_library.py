@@ -631,3 +631,24 @@ def test_keys_that_are_set_stand_in_place_of_those_of_the_specification():
     refused("TC104", tc.load, again, settings={"tube.epsilon": 0.2})
     refused("TC103", tc.load, DATA, settings={"tube.width": 0.2})
     refused("TC106", tc.load, DATA, settings={"tube.rho_a": object()})
+
+
+def test_nothing_is_written_over_what_is_another_file(tmp_path):
+    """`r.save("plant.yaml")` took the place of the specification, a comparison that of its certificate."""
+    spec, sealed, table, mine = (tmp_path / name for name in ("a.yaml", "a.json", "a.csv", "a.metric.json"))
+    result, metric = certified(), tc.verify(DATA)
+    spec.write_text(TEXT, encoding="utf-8")
+    table.write_text("t,p,v,u\n", encoding="utf-8")
+    mine.write_text('{"format": "tubecert-metric/1", "rate": "1", "dual_metric": [["1"]]}', encoding="utf-8")
+    for _ in range(2):  # over its own kind
+        result.save(sealed)
+        metric.save(tmp_path / "b.metric.json")
+    sides = tc.compare(result, sealed)
+    before = [path.read_bytes() for path in (spec, sealed, table, mine)]
+    refused("TC120", result.save, spec)
+    refused("TC120", sides.save, sealed)
+    refused("TC120", sides.save, table)
+    refused("TC120", metric.save, mine)
+    refused("TC120", metric.save, sealed)
+    refused("TC106", result.save, None)
+    assert [path.read_bytes() for path in (spec, sealed, table, mine)] == before

@@ -280,7 +280,8 @@ def test_a_kept_metric_replaces_nothing_written_by_hand(tmp_path):
     spec.write_text(small())
     for text in ('{"format": "tubecert-metric/1", "rate": 1, "dual_metric": [["1"]]}', "no JSON", "[1]"):
         hand.write_text(text)
-        refuses(certify(spec, "-o", target), "was not written by tubecert")
+        refuses(certify(spec, "-o", target), "is no metric file that tubecert wrote")
+        refuses(synth(spec, "-o", hand), "is no metric file that tubecert wrote")
         assert hand.read_text() == text
         assert not target.exists()
     hand.unlink()

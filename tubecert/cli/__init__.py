@@ -6,7 +6,7 @@ Until a command is called, nothing but typer and the error family is imported: `
 | module | what it does |
 |---|---|
 | `process`, `keeper` | signals, exit codes, a command that can be ended at any moment |
-| `telling` | what a command tells by then, and shows at the end; which files it must not overwrite |
+| `telling` | what a command tells by then, and shows at the end |
 | `app`, `adapter` | questions and their words as commands; the options that all share |
 | `guard` | every way a command can end -> one exit code and no traceback |
 | `certify`, `check`, ... | commands that do more than show what the library gives |

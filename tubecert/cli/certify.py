@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -13,15 +12,15 @@ from tubecert.asking import SETTINGS, SPEC, Text, words_of
 from tubecert.cli import keeper, telling
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.report import check_pages
-from tubecert.cli.telling import plan_of, refused, spare
+from tubecert.cli.telling import plan_of
 from tubecert.digits import exact
-from tubecert.errors import ExitCode, TubecertError
-from tubecert.files import read, stem_of
+from tubecert.errors import ExitCode
+from tubecert.files import stem_of
 from tubecert.library import certifying
 from tubecert.library.pages import Report
+from tubecert.library.shown import spare
 from tubecert.library.specification import Specification
 from tubecert.spec import Setting, Spec, load
-from tubecert.spec.source import METRIC
 from tubecert.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ def certify(
     metric = asked.get("metric")
     certificate.check_target(output)
     inputs = {"specification": spec, "metric file": metric}
-    spare(output, inputs)
+    spare(output, inputs=inputs)
     check_pages(report, {**inputs, "certificate": None if output == certificate.STDOUT else output})
     system = load(spec, settings)
     if left := asked.pop("deadline", None):
@@ -113,26 +112,13 @@ def _kept_place(file: str, system: Spec, beside: str, *, synthesised: bool) -> s
     Raises `TargetError` if it cannot go there, or would take the place of an input or of what somebody wrote by hand.
     """
     plan = plan_of(file, system)
-    spare(beside, {"plan": plan})
+    spare(beside, "certificate", {"plan": plan})
     if beside == certificate.STDOUT or not synthesised or system.metric or system.synthesis is None:
         return None
     target = str(Path(f"{stem_of(beside)}.metric.json"))
     certificate.check_target(target)
-    spare(target, {"specification": file, "plan": plan})
-    if Path(target).exists() and not _by_tubecert(target):
-        raise refused(
-            f"{target} was not written by tubecert and would be overwritten by the metric that is synthesised"
-        )
+    spare(target, "metric file", {"specification": file, "plan": plan})
     return target
-
-
-def _by_tubecert(path: str) -> bool:
-    """Whether a file is a metric that tubecert wrote: it can write it again."""
-    try:
-        content = json.loads(read(path, METRIC))
-    except (TubecertError, ValueError, RecursionError):
-        return False
-    return isinstance(content, dict) and "solver" in content and "verified_on" in content
 
 
 def _kept_metric(found: Certification | SampledCertification, target: str | None) -> str | None:

@@ -10,8 +10,9 @@ from tubecert import certificate
 from tubecert.asking import CERTIFICATE, Choice, Text, refuse
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.telling import present, refused, spare
+from tubecert.cli.telling import present
 from tubecert.files import STDIN
+from tubecert.library.shown import refused, spare
 
 _FILES = "A page or a table: FILE.html (with figures), FILE.md, FILE.csv or FILE.json; may be repeated."
 _WORDS: Final = {
@@ -35,9 +36,9 @@ def compare(
     if certificates.count(STDIN) > 1:
         raise refused("- is given twice: one certificate can be on stdin", "give files")
     for target in output:
-        comparing.Comparison.form_of(target)
+        form = comparing.Comparison.form_of(target)
         certificate.check_target(target, comparing.Comparison.remedy)
-        spare(target, {f"certificate {path}": path for path in certificates if path != STDIN})
+        spare(target, form, {f"certificate {path}": path for path in certificates if path != STDIN})
     comparison = comparing.compare(*certificates)
     for target in output:
         comparison.save(target)

@@ -11,8 +11,8 @@ from tubecert import certificate
 from tubecert.asking import Choice, Flag, Text, refuse
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.telling import refused
 from tubecert.errors import TargetError
+from tubecert.library.shown import refused
 from tubecert.printable import visible
 
 _BESIDE: Final = {"csv": ("plan.csv",)}  # files that a template needs beside it

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from tubecert.asking import CERTIFICATE, Text, words_of
-from tubecert.certificate.file import check_target, same_file
+from tubecert.certificate.file import check_target
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.telling import refused
 from tubecert.files import STDIN, stem_of
 from tubecert.library import pages
 from tubecert.library.reading import read
+from tubecert.library.shown import refused, spare
 from tubecert.printable import printable_json, visible
 
 _FILES: Final = "The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]"
@@ -54,14 +54,11 @@ def check_pages(targets: Sequence[str], taken: Mapping[str, str | None]) -> None
 
     `taken` says which files must stay what they are.
     """
-    kept = {what: path for what, path in taken.items() if path is not None}
+    kept = dict(taken)
     for page in targets:
-        pages.Report.form_of(page)
+        form = pages.Report.form_of(page)
         check_target(page, pages.Report.remedy)
-        for what, path in kept.items():
-            if Path(path).resolve() == Path(page).resolve() or same_file(page, path):
-                message = f"cannot write {page}: it is the {what} itself"
-                raise refused(message, "choose another file for the page")
+        spare(page, form, kept, "choose another file for the page")
         kept[f"page {page}"] = page
 
 

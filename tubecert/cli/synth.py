@@ -15,6 +15,7 @@ from tubecert.cli.adapter import Output, command
 from tubecert.cli.telling import text_of
 from tubecert.errors import ExitCode
 from tubecert.library import metrics
+from tubecert.library.shown import refused, spare
 from tubecert.library.specification import Specification
 from tubecert.printable import visible
 from tubecert.report.terminal import Terminal
@@ -48,12 +49,12 @@ def synth(
     """Find a dual metric, round it, and write it only if C1-C3 are proven on the whole safe set."""
     for place in filter(None, (output, plot)):
         certificate.check_target(place)
-        telling.spare(place, {"specification": spec})
+        spare(place, inputs={"specification": spec})
     if plot and Path(plot).suffix.lower() != ".svg":
         message = f"cannot write {plot}: the comparison is drawn as SVG"
-        raise telling.refused(message, "give a file FILE.svg")
+        raise refused(message, "give a file FILE.svg")
     system = load(spec, settings, "plant")
-    telling.spare(output, {"plan": telling.plan_of(spec, system)})
+    spare(output, "metric file", {"plan": telling.plan_of(spec, system)})
     how = replace(how, json=how.json or output == certificate.STDOUT)
 
     def judged(so_far: Synthesised) -> None:

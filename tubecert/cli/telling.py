@@ -1,4 +1,4 @@
-"""What a command tells: to who looks at it, to who keeps it for an end that comes from outside; and where it writes."""
+"""What a command tells: to who looks at it, and to who keeps it for an end that comes from outside."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tubecert import certificate
 from tubecert.claims.family import Reason
 from tubecert.cli import keeper
 from tubecert.cli.guard import write_stdout
 from tubecert.digits import exact, short
-from tubecert.errors import ExitCode, TargetError
-from tubecert.findings import Finding
+from tubecert.errors import ExitCode
 from tubecert.printable import visible
 from tubecert.progress import Phase, Progress, Step
 from tubecert.report import progress
@@ -166,18 +164,6 @@ def text_of(how: Output, page: Page, closing: Rows, data: str | None = None) -> 
         return data
     shown = [headline(page)] if how.quiet else screen(page, closing, verbose=how.verbose)
     return Terminal.stdout(color=how.color).text(shown)
-
-
-def refused(message: str, help: str = "choose another file with -o FILE") -> TargetError:
-    """The error about a file that is not written."""
-    return TargetError([Finding(code="TC120", message=message, help=help)])
-
-
-def spare(target: str, inputs: Mapping[str, str | Path | None]) -> None:
-    """Raise `TargetError` for a target that would take the place of an input; `inputs` are named by what they are."""
-    for what, source in inputs.items():
-        if source is not None and target != certificate.STDOUT and certificate.same_file(target, source):
-            raise refused(f"{target} is the {what} itself and would be overwritten")
 
 
 def plan_of(file: str, system: Spec) -> Path | None:

@@ -12,10 +12,10 @@ from tubecert.asking import ENDING, SETTINGS, Flag, Text, words_of
 from tubecert.cli import telling
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
-from tubecert.cli.telling import refused, spare
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Location
 from tubecert.library import metrics
+from tubecert.library.shown import refused, spare
 from tubecert.library.specification import Specification
 from tubecert.printable import visible
 from tubecert.progress import Phase
@@ -58,7 +58,7 @@ def verify(
         if len(cases) != 1:
             raise refused(f"-o takes one metric, and {len(cases)} were given", "verify them one by one")
         certificate.check_target(output)
-        spare(output, {"input": cases[0][0], "specification": cases[0][1].path})
+        spare(output, "metric file", {"input": cases[0][0], "specification": cases[0][1].path})
     found: list[VerifiedMetric] = []
     for file, spec in cases:
         with telling.shown(how) as show:

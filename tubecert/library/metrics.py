@@ -13,7 +13,7 @@ from tubecert.errors import ExitCode, SpecError
 from tubecert.findings import Finding, Location
 from tubecert.library.certifying import BUDGET, DEADLINE
 from tubecert.library.plain import Data, document_text
-from tubecert.library.shown import Shown
+from tubecert.library.shown import Shown, spare
 from tubecert.library.specification import File, Specifiable, require_once, settings_in, spec_of
 from tubecert.progress import Progress
 from tubecert.records import to_json
@@ -81,8 +81,13 @@ class _Metric(Shown):
         return certificate.dump(self.file.to_json())
 
     def save(self, path: File) -> None:
-        """Write the metric file, as `synth` does. Raises `TubecertError` if nothing is proven, `TargetError`."""
-        certificate.write_text(os.fspath(path), self.text(), "choose another file")
+        """Write the metric file, as `synth` does, over nothing but an older one that tubecert wrote.
+
+        Raises `TubecertError` if nothing is proven, `TargetError`.
+        """
+        target, text = asking.text_of("path", path), self.text()
+        spare(target, "metric file")
+        certificate.write_text(target, text, "choose another file")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

@@ -1,17 +1,68 @@
-"""What shows itself: in a line, and as a card in notebooks."""
+"""What shows itself: in a line, and as a card in notebooks; and what it must not be written over."""
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
-from typing import ClassVar
+from pathlib import Path
+from typing import ClassVar, Final
 
-from tubecert.certificate.file import write_text
-from tubecert.errors import ExitCode, TargetError
+from tubecert.asking import text_of
+from tubecert.certificate.file import KIND, STDOUT, same_file, write_text
+from tubecert.errors import ExitCode, TargetError, TubecertError
+from tubecert.files import read
 from tubecert.findings import Finding
+from tubecert.printable import visible
 from tubecert.report import html, markdown
 from tubecert.report.page import Page
 from tubecert.report.text import Rows, headline
+
+# of what is written: how its text begins, else the keys that it has as JSON
+_BEGINS: Final = {"html": "<!DOCTYPE html>", "markdown": "#", "csv": "quantity,"}
+_KEYS: Final = {
+    "certificate": {"format", "hash", "result"},
+    "metric file": {"format", "solver", "verified_on"},
+    "json": {"certificates", "quantities", "differences"},
+}
+
+
+def refused(message: str, help: str = "choose another file with -o FILE") -> TargetError:
+    """The error about a file that is not written."""
+    return TargetError([Finding(code="TC120", message=message, help=help)])
+
+
+def spare(
+    target: str,
+    what: str = "",
+    inputs: Mapping[str, str | Path | None] = {},
+    help: str = "choose another file",
+) -> None:
+    """Raise `TargetError` for a target that would take the place of an input, or of what is no `what` of tubecert.
+
+    `inputs` are named by what they are. An older file of the same form is replaced.
+    """
+    if target == STDOUT:
+        return
+    for name, source in inputs.items():
+        if source is not None and (
+            os.path.abspath(source) == os.path.abspath(target) or same_file(target, source)
+        ):
+            raise refused(f"{visible(target)} is the {name} itself and would be overwritten", help)
+    if what and Path(target).is_file() and not _written_as(what, target):
+        raise refused(f"{visible(target)} is no {what} that tubecert wrote, and would be overwritten", help)
+
+
+def _written_as(what: str, path: str) -> bool:
+    """Whether tubecert writes files like this one, which may be empty, as a `what`."""
+    try:
+        text = read(path, KIND).decode().lstrip()
+        if what in _BEGINS or not text:
+            return not text or text.startswith(_BEGINS[what])
+        content = json.loads(text)
+    except (TubecertError, ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and _KEYS[what] <= content.keys()
 
 
 class Shown:
@@ -74,14 +125,15 @@ class Paged(Shown):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write it, by the ending of the name. Raises `TargetError`."""
-        target = os.fspath(path)
-        write_text(target, getattr(self, self.form_of(target)), self.remedy)
+        target = text_of("path", path)
+        form = self.form_of(target)
+        spare(target, form)
+        write_text(target, getattr(self, form), self.remedy)
 
     @classmethod
     def form_of(cls, target: str) -> str:
         """What a file of this name holds; raises `TargetError` for a name by which it cannot be written."""
         ending = os.path.splitext(target)[1].lower()
         if ending not in cls.forms:
-            message = f"cannot write {target}: {cls.known}"
-            raise TargetError([Finding(code="TC120", message=message, help=cls.remedy)])
+            raise refused(f"cannot write {target}: {cls.known}", cls.remedy)
         return cls.forms[ending]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,13 +10,13 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from tubecert.asking import require_installed
+from tubecert.asking import require_installed, text_of
 from tubecert.certificate import file
 from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
-from tubecert.library.shown import Shown
+from tubecert.library.shown import Shown, spare
 from tubecert.library.specification import File, Specification
 from tubecert.report.figures_axes import Chart
 from tubecert.report.figures_file import paint
@@ -105,8 +104,13 @@ class Stated(Shown, Generic[C]):
         return Specification(spec=spec)
 
     def save(self, path: File) -> None:
-        """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`."""
-        file.write_text(os.fspath(path), self.text, "choose another file")
+        """Write the certificate, byte for byte as `tubecert certify -o` does; raises `TargetError`.
+
+        What is there, and no certificate, is not overwritten.
+        """
+        target = text_of("path", path)
+        spare(target, "certificate")
+        file.write_text(target, self.text, "choose another file")
 
     def plot_tube(self, ax: Axes | None = None, *, states: tuple[str, str] | None = None) -> Axes:
         """Draw plan, tube, safe set and obstacles in the plane of two states (the first two); returns the axes.
