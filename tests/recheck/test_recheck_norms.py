@@ -4,6 +4,7 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
+import proven
 import pytest
 import rechecked
 from flint import ctx
@@ -12,12 +13,34 @@ from tubecert.recheck import norms as by_norms
 from tubecert.recheck.balls import exact
 from tubecert.recheck.cover import BOXES, Outcome
 from tubecert.recheck.curve import expressed
-from tubecert.recheck.norms import column_below, norms
+from tubecert.recheck.norms import QuadraticNotNegative, column_below, norms
 from tubecert.recheck.place import Place
 from tubecert.recheck.statements import NormsBelow
 from tubecert.recheck.terms import number
 
 NAMES = ("x", "y", "t", "m")
+SLENDER = """
+tubecert: 1
+name: slender
+system:
+  states: [x, y, vx, vy]
+  inputs: [ux, uy]
+  f: [vx, vy, -0.3*vx - 0.2*sin(y), -0.3*vy + 0.1*x*y]
+  B: [[0, 0], [0, 0], [1, 0.2], [0, 1]]
+safe_set: {x: [-1, 1], y: [-1, 1], vx: [-2, 2], vy: [-2, 2]}
+uncertainty: {h: ["0.1*sin(t)", "0.05*x"]}
+trajectory: {kind: equilibrium, at: [0, 0, 0, 0]}
+tube: {half_widths: {x: 0.1, y: 0.1}}
+metric:
+  rate: 1.3
+  dual_metric:
+    - [0.05658, -0.062018, -0.17159, 0.1886]
+    - [-0.062018, 0.068984, 0.1886, -0.20931]
+    - [-0.17159, 0.1886, 3.9279, 0.082]
+    - [0.1886, -0.20931, 0.082, 3.9115]
+conditions: {decides: B}
+"""
+"""Of condition number 8800 in x: boxes alone do not find where the tube ends."""
 RHO, UNTIL = Fraction(1, 2), Fraction(3)
 FUNCTIONS = {"sin": np.sin, "cos": np.cos, "exp": np.exp}
 
@@ -110,3 +133,24 @@ def test_a_bound_is_above_every_corner_that_floats_do_not_tell_apart():
     with ctx.workprec(BOXES):
         bound = NormsBelow([[column("1 + (x + y)/576460752303423488")]], Fraction(0)).bound([(-1.0, 1.0)] * 2)
         assert bound >= exact(1 + Fraction(1, 2**58))
+
+
+@pytest.mark.parametrize(("least", "proven"), [(0.01, True), (-0.001, False)])
+def test_variables_that_go_together_are_examined_together(least, proven):
+    """(100 x - 99 y)^2 + x y/100 is at least 0 to within 0.01, though its corners say nothing."""
+    (e,) = column(f"(100*x - 99*y)**2 + 0.002*x*sin(y) + {least}")
+    assert QuadraticNotNegative(e).over([(-1.0, 1.0)] * 2).proven is proven
+
+
+@pytest.mark.slow
+def test_the_drift_over_a_long_thin_tube_is_confirmed_as_it_is_enclosed():
+    document = proven.proven(SLENDER, bare=True)
+    constant = document["result"]["constants"]["drift_on_plan"]
+    assert constant["above"] < 1.0001 * constant["below"]
+    assert rechecked.failing(rechecked.examine(document, 2_000)) == []
+    place = rechecked.case_of(document).place
+    short = Fraction(constant["below"]) * Fraction(99_999, 100_000)
+    assert not column_below(place, [row[0] for row in place.fields.f], short, 400).holds
+    constant |= {end: 0.99 * constant[end] for end in constant}
+    found = rechecked.examine(rechecked.sealed(document), 2_000)
+    assert ["drift_on_plan" in name for name, _ in rechecked.failing(found)] == [True]

@@ -17,7 +17,7 @@ For the largest |G|^2 over d'Q d <= rho^2, d = x - x*, boxes alone are poor: nea
 outside. With any L >= 0, t^2 - |G|^2 - L (rho^2 - d'Q d) >= 0 on a box proves |G| <= t for its points in the tube, and
 with the multiplier of the maximum the left-hand side has no slope along the boundary. L is a proposal: an ascent in
 floats. Q is the identity for a ball; of an ellipsoid in more states it is that of the projection.
-A box is examined by a lower bound of the quadratic form about its centre, one variable at a time.
+A box is examined by a lower bound of the quadratic form about its centre, one variable at a time or as a whole.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from itertools import product
 
 from flint import arb
 
-from tubecert.recheck.balls import Ball, exact, length, sharp_norm
+from tubecert.recheck.balls import Ball, exact, is_positive, length, sharp_norm
 from tubecert.recheck.boxes import Box, Found
 from tubecert.recheck.cover import Outcome, prove, together
 from tubecert.recheck.lipschitz import norms_below
@@ -122,17 +122,13 @@ def _samples(place: Place, beside: tuple[str, ...]) -> list[tuple[float, ...]]:
 
 def _multiplier(square: _Square, rho: float, samples: list[tuple[float, ...]]) -> Fraction | None:
     """L with grad |G|^2 = 2 L Q (x - x*) at the largest |G|^2 that is found on x - x* = C d, |d| = rho."""
-    starts = []
-    for start in range(2 * square.count):
-        d = [0.1 * rho] * square.count
-        d[start // 2] = rho if start % 2 else -rho
-        starts.append(d)
+    n = range(square.count)
+    starts = [[end if i == j else 0.1 * rho for j in n] for i in n for end in (-rho, rho)]
     beside = samples[0]
     if len(samples) > 1:  # the ascent leaves them as they are
         largest = max(product(starts, samples), key=lambda pair: square.at(*pair)[0])
         starts, beside = [largest[0]], largest[1]
-    best = -math.inf
-    share = 0.0
+    best, share = -math.inf, 0.0
     for first in starts:
         d, value, along = first, -math.inf, 0.0
         for _ in range(_ASCENTS):
@@ -152,6 +148,8 @@ class QuadraticNotNegative:
 
     Off the diagonal, 2 |d_i d_j| <= d_i^2 r_j/r_i + d_j^2 r_i/r_j; what remains is g d + h d^2/2 in each variable,
     whose least value for |d| <= r is known exactly. Curvature upward is never paid for.
+    Where variables go together, as in a long thin tube, all n at once: with |d_i| <= 1 in units of the box,
+    2 e(x) >= [1 d'] [[e, g'], [g, h + (e/n) I]] [1 d']', because e d'd/n <= e. A definite matrix is proof.
     """
 
     def __init__(self, e: Term) -> None:
@@ -164,15 +162,17 @@ class QuadraticNotNegative:
         )
 
     def over(self, box: Box) -> Found:
-        """The least value of the quadratic form."""
+        """The least value of the quadratic form, or that it is definite."""
         middle = [arb(min(max(0.5 * lo + 0.5 * hi, lo), hi)) for lo, hi in box]
         radius = [(arb(hi) - c).max(c - arb(lo)).upper() for (lo, hi), c in zip(box, middle, strict=True)]
         value, *slope = self._centre.run(middle)
         bends = self._bends.run([arb(lo).union(arb(hi)) for lo, hi in box])
         steepest = [r * g for r, g in zip(radius, slope, strict=True)]  # in units of the box: |d| <= 1
         bend = [arb(0)] * len(box)
+        form = [[value, *steepest], *([g, *bend] for g in steepest)]
         for (i, j), h in zip(self._pairs, bends, strict=True):
             size = radius[i] * radius[j] * h
+            form[i + 1][j + 1] = form[j + 1][i + 1] = size + (value / len(box) if i == j else 0)
             if i == j:
                 bend[i] = bend[i] + size
             else:
@@ -180,7 +180,7 @@ class QuadraticNotNegative:
         least = [_least(g, h) for g, h in zip(steepest, bend, strict=True)]
         total = value + sum(least, start=arb(0))
         causes = [max(0.0, -float(x.lower())) if x.is_finite() else math.inf for x in least]
-        return Found(bool(total >= 0), causes, [0.0] * len(box))
+        return Found(bool(total >= 0) or is_positive(form), causes, [0.0] * len(box))
 
     def broken(self, point: Sequence[Ball]) -> bool:
         """A multiplier that does not serve refutes nothing."""
