@@ -652,3 +652,11 @@ def test_nothing_is_written_over_what_is_another_file(tmp_path):
     refused("TC120", metric.save, sealed)
     refused("TC106", result.save, None)
     assert [path.read_bytes() for path in (spec, sealed, table, mine)] == before
+
+
+def test_a_certification_ends_at_its_deadline():
+    """It ended when it was done: only the search for a metric looked at the time."""
+    with pytest.raises(tc.TubecertError, match="the deadline has passed") as caught:
+        tc.certify(DATA, deadline=1e-6)
+    assert caught.value.exit_code == 4
+    assert tc.certify(DATA, conditions="a", deadline=100).certified

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from tubecert.library.sampled import SampledCertification
     from tubecert.pipeline.synthesised import Synthesised
 
-_OF_SEARCH: Final = 0.5  # of the time that is given: the certification has the rest
 _WORDS: Final = {
     "spec": SPEC,
     "settings": SETTINGS,
@@ -63,9 +62,8 @@ def certify(
     spare(output, inputs=inputs)
     check_pages(report, {**inputs, "certificate": None if output == certificate.STDOUT else output})
     system = load(spec, settings)
-    if left := asked.pop("deadline", None):
-        # a sampled loop has no search that could look at the time: the command is ended then, whatever it does
-        asked |= {} if system.hardware else {"deadline": left * _OF_SEARCH}
+    if system.hardware:  # which has no search that could look at the time: the command is ended then
+        asked.pop("deadline", None)
     kept = _kept_place(spec, system, output, synthesised=metric is None)
     if kept is not None:
         telling.warn_of_size(system, how)

@@ -6,12 +6,15 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tubecert import asking
 from tubecert.asking import Number
+from tubecert.errors import ExitCode, TubecertError
 from tubecert.executor import held
+from tubecert.findings import Finding
 from tubecert.letters import ALL, words_of
 from tubecert.libraries import versions
 from tubecert.library.specification import Specifiable, Specification, require_once, settings_in, spec_of
@@ -36,6 +39,9 @@ METRIC_NAME: Final = asking.Text(
 )
 DECIDING: Final = (*words_of(), ALL)
 AUTO: Final = "auto"  # the gap of each constant by its effect
+_OF_SEARCH: Final = Fraction(
+    1, 2
+)  # of the time: the certification with the metric that is found has the rest
 PAIR: Final = ("bandwidth", "adaptation_rate")
 _GAP: Final = (
     "Relative width at which a constant is sharp enough; auto: of each by its effect on the gains.  "
@@ -95,7 +101,8 @@ def certify(
     long search are shared by `jobs` processes (then the caller's own code stands below `if __name__ == "__main__":`),
     or by the workers of a Dask cluster at the address `scheduler`; no result depends on that.
 
-    Returns the certificate whatever the verdict is. Raises `SpecError` for what makes the question meaningless.
+    Returns the certificate whatever the verdict is. Raises `SpecError` for what makes the question meaningless, and
+    `TubecertError` once `deadline` s have passed: half of them are for a metric that is looked for.
     """
     from tubecert.library import sampled
 
@@ -123,13 +130,27 @@ def certify(
         budget=budget or usual.budget,
     )
     run = ran("tubecert.certify")
-    listeners = pipeline.Listeners(
-        kept=asking.hears(progress, "kept"), deadline=pipeline.Deadline.after(deadline)
-    )
+    seconds = asking.exact(deadline)
+    looking = pipeline.Deadline.after(None if seconds is None else seconds * _OF_SEARCH)
+    listeners = pipeline.Listeners(kept=asking.hears(progress, "kept"), deadline=looking)
+    told = timed(progress)
+    if seconds is not None:
+        told = pipeline.Listeners(progress=told, deadline=pipeline.Deadline.after(seconds))
     with held(workers_of(jobs, scheduler)) as workers:
-        result = pipeline.certify(whole, options, timed(progress), listeners=listeners, workers=workers)
+        try:
+            result = pipeline.certify(whole, options, told, listeners=listeners, workers=workers)
+        except pipeline.OutOfTime:
+            raise _too_late() from None
     sealed = certificate.seal(result.to_json(), run())
     return certification_of(sealed, Specification(spec=overridden(whole, options)))
+
+
+def _too_late() -> TubecertError:
+    """The error where the time is up before anything is decided."""
+    help = "more time, a wider gap, or a smaller safe set or tube"
+    error = TubecertError([Finding(code="TC112", message="undecided: the deadline has passed", help=help)])
+    error.exit_code = ExitCode.UNDECIDED
+    return error
 
 
 def ran(function: str) -> Callable[[], Mapping[str, object]]:

@@ -25,7 +25,7 @@ from tubecert.letters import ALONE
 from tubecert.metric.verify import Proofs
 from tubecert.pipeline.certification import answer, question_of, result
 from tubecert.pipeline.checks import inspect, missing_sections, sound_time, unsearchable
-from tubecert.pipeline.listening import Deadline, Listeners, counted
+from tubecert.pipeline.listening import Deadline, Listeners, OutOfTime, counted
 from tubecert.progress import Progress
 from tubecert.spec import Spec, Synthesis
 from tubecert.stages.question import Memory, Options, Question, Stopped, overridden
@@ -39,6 +39,7 @@ __all__ = [
     "Listeners",
     "Memory",
     "Options",
+    "OutOfTime",
     "Result",
     "certify",
     "inspect",
