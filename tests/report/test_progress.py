@@ -186,7 +186,7 @@ def test_pieces_count_with_what_is_done_in_them():
 
 def test_in_words():
     step = Step(phase=Phase.CERTIFICATION, name="feedback_gain", count=12000, below=0.5, above=0.75)
-    assert described(step) == "proving |feedback| per Riemannian distance, 12,000 boxes, between 0.5 and 0.75"
+    assert described(step) == "proving |feedback| per Riemannian distance, 12,000 boxes"
     step = replace(step, done=17, of=33, seconds=4.2, left=3.9)
     assert described(step).startswith("17 of 33 claims done; 5 s so far, about 4 s left; proving |feedback|")
     assert described(Step(phase=Phase.GAINS, name="distance", done=30, of=33)) == (
@@ -194,6 +194,21 @@ def test_in_words():
     )
     step = Step(phase=Phase.SYNTHESIS, name="rate 2, degree 0", count=3, unit=Unit.STEPS)
     assert described(step) == "looking for a metric: rate 2, degree 0, 3 steps"
+
+
+def test_what_was_found_has_no_value_of_another_quantity(monkeypatch):
+    """Of M's least eigenvalue, which is found as the largest of W, that was told; and each of them in every round."""
+    from tubecert.cli import telling
+
+    lines = []
+    monkeypatch.setattr(telling, "found", lines.append)
+    told = telling.Told(None, None, None)
+    for name in ("lower", "upper", "lower", "upper", "h"):
+        told(Step(phase=Phase.CERTIFICATION, name=name, count=1, below=1214.0, above=1214.1))
+    assert lines == [
+        "smallest eigenvalue of the metric M, 1 box",
+        "largest eigenvalue of the metric M, 1 box",
+    ]
 
 
 @pytest.mark.parametrize("phase", Phase)

@@ -6,7 +6,7 @@ import contextlib
 import inspect
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -73,6 +73,7 @@ class Told:
     judged: Callable[[Synthesised], None] | None
     last: Step | None = None
     when: float = 0.0
+    told: set[tuple[Phase, str]] = field(default_factory=set)
 
     def found(self, line: str) -> None:
         """A line about what was found."""
@@ -89,7 +90,10 @@ class Told:
             return
         self.when = now
         if before is not None and new and before.phase in _CLAIMS:
-            found(came_to(before))
+            key = before.phase, before.name
+            if key not in self.told:  # closer bounds of the same constants come later
+                found(came_to(before))
+            self.told.add(key)
         keeper.tell({"at": visible(described(step)), "next": next_step(step.phase)})
 
 

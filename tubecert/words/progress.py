@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from tubecert.digits import near
 from tubecert.letters import NAMES
 from tubecert.progress import Phase, Step, Unit
 
@@ -68,8 +67,8 @@ def duration(seconds: float) -> str:
 
 
 def came_to(step: Step) -> str:
-    """What the search for a constant, or for gains, was seen to come to."""
-    words = f"{_name(step)}{_found(step)}" if step.phase is not Phase.GAINS else f"certificate {_name(step)}"
+    """A search that was done: for a constant, whose value only the certificate tells, or for gains."""
+    words = f"certificate {_name(step)}" if step.phase is Phase.GAINS else _name(step)
     return f"{words}, {_counted(step)}" if step.count else words
 
 
@@ -96,17 +95,11 @@ def _now(step: Step) -> str:
         words += f", {_counted(step)}"
     if step.share > 0:
         words += f", {100 * step.share:.0f} % of this part proven"
-    return words + _found(step)
+    return words
 
 
 def _counted(step: Step) -> str:
     return f"{step.count:,} {step.unit if step.count != 1 else _ONE[step.unit]}"
-
-
-def _found(step: Step) -> str:
-    if not (math.isfinite(step.below) and math.isfinite(step.above)):
-        return ""
-    return f", between {near(step.below, 4)} and {near(step.above, 4)}"
 
 
 def _name(step: Step) -> str:
