@@ -141,7 +141,7 @@ class Choice(Kind):
         """The word."""
         from tubecert.expression import suggestion
 
-        word = str(value)
+        word = next((own for own in self.words if own.lower() == str(value).lower()), str(value))
         if word not in self.words:
             known = suggestion(word, self.words, what="choices")
             refuse(name, word, f"{name} is {word[:60]!r}; {known}")
@@ -326,8 +326,8 @@ def read(
         missing = [name for name in pair if given.get(name) is None]
         if len(missing) == 1:
             (there,) = {*pair} - {*missing}
-            message = f"{named(there)} and {named(*missing)} are given together"
-            findings.append(_finding(named(there), str(given[there]), message))
+            message = f"{named(*missing)} is missing beside {named(there)}"
+            findings.append(_finding(named(there), str(given[there]), message, "give both, or neither"))
     if findings:
         raise SpecError(findings)
     return found

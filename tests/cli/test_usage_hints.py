@@ -44,7 +44,7 @@ def test_a_command_line_that_means_something_else(
     (("certify", "plant.yml"), "there is plant.yaml"),
     (("certify", "folder/plan.yaml"), "no such file or directory"),
     (("certify", "plant.yaml", "--metric", "plant.json"), "there is plant.metric.json"),
-    (("certify", "plant.yaml"), "`tubecert synth plant.yaml` finds one; then add --metric plant.metric.json"),
+    (("certify", "plant.yaml"), "`tubecert synth plant.yaml` finds one; then `tubecert certify plant.yaml --metric"),
     (("verify", "plant.yaml"), "a metric file after the specification (tubecert synth finds one)"),
     (("report", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),
     (("recheck", "plant.yaml"), "`tubecert certify plant.yaml` writes one: plant.certificate.json"),

@@ -41,7 +41,7 @@ def test_what_a_kind_does_not_take_is_refused(given):
 
 
 def test_what_goes_together_is_told_to_lack_its_half():
-    with pytest.raises(tc.SpecError, match="runs and gap are given together"):
+    with pytest.raises(tc.SpecError, match="gap is missing beside runs"):
         asked(runs=1)
     assert asked(gap="auto", runs=0) == ("auto", 0)
     with pytest.raises(AssertionError):
@@ -51,6 +51,7 @@ def test_what_goes_together_is_told_to_lack_its_half():
 
 
 def test_words_are_known_and_names_are_lists():
+    assert Choice("", words=("A", "all")).read("conditions", "a") == "A"
     assert Names("").read("x", " a, b,a ") == ("a", "b") == Names("").read("x", ["a", "b"])
     with pytest.raises(tc.SpecError, match="did you mean auto"):
         Choice("", words=("auto", "sos")).read("route", "aut")

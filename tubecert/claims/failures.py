@@ -170,7 +170,9 @@ class NothingFound(Failure):
             return "no metric was found"
         degrees, routes = ", ".join(map(str, self.degrees)), " and ".join(self.routes)
         last = "" if self.last is None else f"; the last: {self.last.told()}"
-        return f"no metric was found: {self.attempts} attempts by {routes}, degree {degrees}{last}"
+        metric = "metric that serves" if isinstance(self.last, Proven) else "metric"
+        attempts = "1 attempt" if self.attempts == 1 else f"{self.attempts} attempts"
+        return f"no {metric} was found: {attempts} by {routes}, degree {degrees}{last}"
 
 
 class NoneCertified(Failure):

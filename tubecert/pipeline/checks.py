@@ -71,7 +71,8 @@ def missing_parts(spec: Spec) -> list[Finding]:
     found = f"{file.stem}.metric.json"
     remedy = "give metric.dual_metric and metric.rate, or have one found: metric: {synthesise: {}}"
     if file.suffix in (".yaml", ".yml"):
-        remedy = f"`tubecert synth {spec.path}` finds one; then add --metric {found}. Or {remedy}"
+        synth, certify = f"tubecert synth {spec.path}", f"tubecert certify {spec.path} --metric {found}"
+        remedy = f"`{synth}` finds one; then `{certify}`. Or {remedy}"
     has_none = spec.metric is None and spec.synthesis is None
     remedy += ". Beside hardware: {rate: 500}, the computer of the loop, no metric is needed, and no radius"
     return [*([_missing(spec, "metric", remedy)] if has_none else []), *missing_radii(spec)]

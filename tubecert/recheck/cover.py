@@ -166,7 +166,7 @@ def prove(test: Test, domain: Domain, budget: int) -> Outcome:
         late = count % _TRIES == 0 and time_is_up()
         if halves is None or count >= budget or late:
             why = f"not proven near {_shown(variables, [arb(0.5 * lo + 0.5 * hi) for lo, hi in box])}"
-            why = f"{why} within {count} boxes{', when the time was up' if late else ''}"
+            why += ", when the time was up" if late else f" within {count} boxes"
             return Outcome(verdict="undecided", why=why, boxes=count)
         waiting += halves
     return Outcome(verdict="confirmed", boxes=count)
