@@ -34,7 +34,7 @@ _ONE_FACTOR = re.compile(
     r"\s*[-+]?\s*(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[A-Za-z]\w*|\([^()]*\))"
     r"(?:\s*[*/]\s*(?:[0-9.]+|[A-Za-z]\w*))*\s*"
 )
-_NEAR_PI: Final = Fraction(
+PI_ABOVE: Final = Fraction(  # the next decimal of 75 digits
     3141592653589793238462643383279502884197169399375105820974944592307816406287, 10**75
 )
 _OF_PI: Final = frozenset({"const", "pi", "add", "mul", "div", "pow"})
@@ -150,7 +150,7 @@ def root_above(square: Fraction) -> Fraction:
 
 def _nearly(e: Expression) -> Fraction:
     """A number made of rationals and pi with 75 digits of pi; raises `ZeroDivisionError` if it has no value then."""
-    found: dict[Expression, Expression] = {graph.PI: graph.constant(_NEAR_PI)}
+    found: dict[Expression, Expression] = {graph.PI: graph.constant(PI_ABOVE)}
     for node in topological([e]):
         found.setdefault(node, rebuild(node, tuple(found[each] for each in node.args)))
     return found[e].fraction

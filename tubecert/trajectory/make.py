@@ -18,8 +18,11 @@ from tubecert.digits import near
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.interval import fraction_bounds
 from tubecert.errors import SpecError
+from tubecert.expression import PI, constant, to_text
+from tubecert.expression.number import PI_ABOVE
+from tubecert.expression.waves import frequencies
 from tubecert.findings import Finding
-from tubecert.model import ControlAffineModel, moving_parts, time_period
+from tubecert.model import TIME, ControlAffineModel, moving_parts, time_period
 from tubecert.spec import Knots, Spec, Task
 from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import Defect, Plan, family
@@ -134,21 +137,27 @@ def unending(spec: Spec, knots: Knots | None) -> list[Finding]:
     if (plan.horizon is None or plan.afterwards != "nothing") and time_period(moving_parts(spec)) is None:
         unseen = "h depends on t for ever, without a period that can be seen"
         return [refused("uncertainty.h", unseen, "give trajectory.horizon, in s")]
-    if plan.afterwards != "repeat" or plan.horizon is None or _repeats(spec, plan.horizon, knots):
+    if plan.afterwards != "repeat" or plan.horizon is None or not (why := _breaks(spec, plan.horizon, knots)):
         return []
-    ends = "the plan does not repeat: its ends differ, or its period is longer than the horizon or unknown"
-    help = "leave out afterwards, or give a plan of a period below trajectory.horizon (for 2*pi write 6.2832)"
-    return [refused("trajectory.afterwards", ends, help)]
+    help = "leave out afterwards, or give a plan that ends as it begins; a horizon may be written as 2*pi"
+    return [refused("trajectory.afterwards", f"the plan does not repeat: {why}", help)]
 
 
-def _repeats(spec: Spec, end: Fraction, knots: Knots | None) -> bool:
-    """Whether a plan begins again where its horizon ends.
+def _breaks(spec: Spec, end: Fraction, knots: Knots | None) -> str:
+    """Why a plan does not begin again where its horizon ends; empty if it does.
 
     Formulas go on as they are, with a period that is not longer than the horizon; knots begin again, which needs
     equal ends and a horizon of whole samples.
     """
     if knots is not None:
-        whole = spec.hardware is None or (end / spec.hardware.sample_time).denominator == 1
-        return whole and knots.t[-1] == end and knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
-    period = time_period(term.expression for term in (*spec.trajectory.x, *spec.trajectory.u))
-    return period is not None and bool(period.hi <= fraction_bounds(end)[0])
+        if spec.hardware is not None and (end / spec.hardware.sample_time).denominator != 1:
+            return "its horizon is no whole number of samples"
+        joined = knots.t[-1] == end and knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
+        return "" if joined else "its ends differ"
+    waves = frequencies((term.expression for term in (*spec.trajectory.x, *spec.trajectory.u)), TIME)
+    if waves is None:
+        return "no common period of its formulas can be seen"
+    length, of_pi = waves.period or (Fraction(0), False)
+    if length * (PI_ABOVE if of_pi else 1) <= end:
+        return ""
+    return f"its period, {to_text(length * PI if of_pi else constant(length))[:40]} s, is longer than its horizon"

@@ -20,6 +20,7 @@ from tubecert.recheck.sampled_loop.theorem import Loop
 from tubecert.recheck.specification import read_sampled_specification
 from tubecert.spec import load_text
 from tubecert.spec.canonical import canonical
+from tubecert.trajectory.make import unending
 
 HOME = {"safe_set": "{x: [-50, 50]}"}
 
@@ -229,6 +230,27 @@ def test_rounding_of_a_controller(arithmetic, unit):
 def test_samples_up_to_the_last_that_differs(sections, starts, lags, last):
     case = case_of([(k, 1, 1) for k in starts], SILENT, lags=lags, **sections)
     assert case.inequalities.last == last
+
+
+@pytest.mark.parametrize(
+    ("wave", "horizon", "goes_on"),
+    [
+        ("sin(t)", "2*pi", True),
+        ("sin(t)", "6.28318530717958647692528676655900577", True),
+        ("sin(t)", "6.28318530717958647692528676655900576", False),
+        ("sin(6*pi*t)", "1/3", True),
+        ("sin(6*pi*t)", "0.33333333333333333333333333333333", False),
+        ("sin(pi*t)*cos(t)", "100", False),
+    ],
+)
+def test_the_exact_period_is_one_that_goes_on(wave, horizon, goes_on):
+    """2*pi and 1/3 were refused, as they are no floats; both who make a plan and who check it decide so."""
+    plan = f"{{kind: expressions, x: ['{wave}'], u: ['0'], horizon: {horizon}, afterwards: repeat}}"
+    spec = load_text(text_of(trajectory=plan, initial_state="{at: [0]}"))
+    assert [item.code for item in unending(spec, None)] == ["TC204"] * (not goes_on)
+    given = asked(trajectory=plan)
+    if "cos" not in wave:
+        assert course_of(given, planned(given)).goes_on is goes_on
 
 
 def test_the_stages_that_may_last_at_a_time_of_the_plan():

@@ -17,7 +17,7 @@ from heapq import heapify, heappush, heapreplace
 from itertools import islice, pairwise, product
 from math import ceil
 
-from flint import arb, arb_mat
+from flint import arb, arb_mat, ctx
 
 from tubecert.recheck.balls import (
     Ball,
@@ -32,6 +32,7 @@ from tubecert.recheck.balls import (
     sizes,
 )
 from tubecert.recheck.boxes import Field
+from tubecert.recheck.cover import SHARP
 from tubecert.recheck.curve import CLOCK, Curve, Knots
 from tubecert.recheck.identity import vanish
 from tubecert.recheck.plans import Plan
@@ -93,7 +94,11 @@ class Course:
         if self.spec.afterwards != "repeat" or isinstance(plan, (Resting, AnyPlan)):
             return True
         if isinstance(plan, Expressed):
-            return bool(common_period([*plan.x, *plan.u]).ball <= exact(plan.horizon))
+            period = common_period([*plan.x, *plan.u])
+            if not period.of_pi:
+                return period.length <= plan.horizon
+            with ctx.workprec(2 * SHARP):  # a horizon of 2*pi is written as the next decimal of 30 digits
+                return bool(period.ball <= exact(plan.horizon))
         assert knots is not None
         joined = knots.x[0] == knots.x[-1] and knots.u[0] == knots.u[-1]
         return joined and plan.horizon % sample == 0 and knots.t[-1] == plan.horizon
