@@ -215,3 +215,9 @@ def test_no_metric_is_put_beside_hardware():
         with_metric(spec, str(ROOT / "configs/pvtol_adaptation.metric.json"))
     with pytest.raises(SpecError, match="proven without a metric"):
         pipeline.question_of(spec, pipeline.Options())
+
+
+@pytest.mark.parametrize("named", ["at: {y: 0.54}", "box: {y: [0.54, 0.55]}"])
+def test_states_that_are_not_named_start_on_a_plan_whose_start_is_irrational_elsewhere(named):
+    plan = LASTING.replace("cos(t)", "cos(t + 1)") + f"initial_state: {{{named}}}\n"
+    assert changed((REST, plan)).x0[0] == 0

@@ -366,6 +366,8 @@ def test_degrees_of_a_plan_are_decimals(tmp_path):
         ("t,p,q,u\n0,1,0,0\n1,1,0,0\n", ", columns: {t: {scale: -1}}", "columns.t.scale is -1"),
         ("t,p,q,u\n0,1,0,0\n1,1,0,0\n", ", columns: {p: {scale: 0}}", "columns.p.scale is 0"),
         ("t,p,v,u\n0,1,0,0\n1,1,0,0\n", ", columns: {}", "lacks a column q"),
+        ("time,p,v,u\n0,1,0,0\n", "", r"(?s)lacks columns t, q and has time, v, .*columns: \{t: time\}"),
+        ("t,p,q,u\n0,5,1,0,0,0,0,0\n1,0,1,0,0,0,0,0\n", "", "(?s)8 cells, twice(?!.*8 cells)"),
         (
             "user,name,secret,more\na,b,c,d\n",
             ", columns: {t: user, p: name, q: secret, u: more}",

@@ -76,7 +76,8 @@ def _check_foreign(text: str, word: str) -> None:
     bare = word.lower().lstrip("+-.")
     if bare in _NOT_FINITE:
         help = "write a finite number"
-        help += "" if "nan" in bare else "; for a claim for all time leave trajectory.horizon out"
+        if "nan" not in bare:
+            help += "; for a claim for all time leave trajectory.horizon out, of an input without limits its entry"
         raise _refused(text, f"{word} is not a finite number", help)
     if bare in _NOT_NUMBERS or not word:
         what = f"{word} is not a number" if word else "a number is missing"

@@ -39,8 +39,8 @@ _KNOWN: Final = "write one number, or [lower, upper]"
 _SHOWN: Final = 40  # characters of an expression
 _NO_TABLE: Final = "{} is a table; tables may be used in f, B, h and plans, not in a metric or in E"
 _A_RANGE: Final = (
-    "{} is known by a range only; such a parameter may be used in f and B alone (elsewhere use its middle, by a name "
-    "of its own)"
+    "{} is known by a range only; such a parameter may be used in f and B alone (elsewhere use its middle, in E "
+    "the end at which E is largest, by a name of its own)"
 )
 _NO_INPUT: Final = (
     "what is proven is how near a controller keeps to a plan: name what it could move, with its column of B; of a "

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Final
 
-from tubecert.expression import ZERO, number_text, substitute, to_text
+from tubecert.digits import near
+from tubecert.expression import ZERO, Expression, number_text, substitute, to_text
+from tubecert.expression.balls import values
 from tubecert.spec import codes
 from tubecert.spec.keys import LIST, PAIR, by_name, form, key, number, numbers_text, section
 from tubecert.spec.names import TIME, Names
@@ -52,8 +54,8 @@ def read_initial_state(
 ) -> InitialState:
     """The initial state, by default the start of the plan."""
 
-    def planned() -> Vector | None:
-        return _start(trajectory, plan) if trajectory and plan else None
+    def planned(given: Collection[str] = ()) -> Vector | None:
+        return _start(trajectory, plan, names, given) if trajectory and plan else None
 
     nowhere, where = InitialState(), field or trajectory
     if where and plan and plan.bundle and (field is None or field.get("within") is None):
@@ -80,7 +82,7 @@ def read_initial_state(
 
 
 def _box(
-    field: Field, planned: Callable[[], Vector | None], names: Names, *, point: bool
+    field: Field, planned: Callable[[Collection[str]], Vector | None], names: Names, *, point: bool
 ) -> tuple[Ends, ...] | None:
     """Values or ranges of every state, or by state; a state that is not named starts on the plan."""
     if field.node.kind != "mapping":
@@ -89,7 +91,7 @@ def _box(
     entries = field.mapping(optional=names.states)
     if entries is None:
         return None
-    start = planned() if len(entries) < len(names.states) else None
+    start = planned(entries) if len(entries) < len(names.states) else None
     others: Sequence[Ends | None] = [(own, own) for own in start] if start else [None] * len(names.states)
     return whole(
         read_ends(entries[name], names, point=point) if name in entries else other
@@ -97,8 +99,8 @@ def _box(
     )
 
 
-def _start(field: Field, plan: Trajectory) -> Vector | None:
-    """x*(0), if it is rational."""
+def _start(field: Field, plan: Trajectory, names: Names, given: Collection[str]) -> Vector | None:
+    """x*(0), which must be rational; 0 in its place where it is not, of states whose start is `given`."""
     if plan.table is not None:
         return plan.table.knots.x[0]
     if plan.bundle is not None:
@@ -108,18 +110,20 @@ def _start(field: Field, plan: Trajectory) -> Vector | None:
             help = "add initial_state: {at: [...]}, or trajectory.start"
             return field.fail(codes.MISSING_KEY, "the planner needs a start", help)
         return plan.task.start
-    start = []
-    for term in plan.x:
+    start: dict[str, Expression] = {}
+    for name, term in zip(names.states, plan.x, strict=True):
         try:
-            value = substitute([term.expression], {TIME: ZERO})[0]
+            start[name] = substitute([term.expression], {TIME: ZERO})[0]
         except ZeroDivisionError:
             message = "the plan is not defined at t = 0"
             return field.reader.report(codes.RANGE, term.location, message, "the horizon begins at t = 0")
-        if not value.is_constant:
-            message = (
-                f"the plan starts at {to_text(value)[:60]}, which is not rational; initial_state is needed"
-            )
-            help = "add initial_state: {at: [...]}"
-            return field.reader.report(codes.MISSING_KEY, term.location, message, help)
-        start.append(value.fraction)
-    return tuple(start)
+    known = {name: value.fraction for name, value in start.items() if value.is_constant}
+    strange = [name for name in start if name not in known and name not in given]
+    if not strange:
+        return tuple(known.get(name, Fraction(0)) for name in names.states)
+    found = values([start[name] for name in strange], {}) or ()
+    at = ", ".join(f"{name}: {near(float(own.mid()), 12)}" for name, own in zip(strange, found, strict=False))
+    message = f"the plan starts at {strange[0]} = {to_text(start[strange[0]])[:60]}, which is not rational"
+    help = f"write decimals near it: initial_state: {{at: {{{at}}}}}, or a box that has them in it"
+    place = plan.x[names.states.index(strange[0])].location
+    return field.reader.report(codes.MISSING_KEY, place, message, help)

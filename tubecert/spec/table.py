@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
 
-from tubecert.expression import suggestion
 from tubecert.expression.lookup import DIGITS, rounded
 from tubecert.findings import capped
 from tubecert.spec import codes, keys
@@ -123,6 +122,9 @@ class _PlanFile:
             if len(values) == MAX_ROWS:
                 message = f"a plan has at most {MAX_ROWS:,} rows"
                 return sheet.fail(row[0], codes.LIMIT, message, "give every second knot")
+            if len(row) == 2 * self.width:
+                message = f"the row has {len(row)} cells, twice as many as the header: decimal commas?"
+                return sheet.fail(row[0], codes.PLAN_COLUMNS, message, "write decimals with a point")
             numbers = self._numbers(row, values[-1] if values else None)
             if numbers is not None:
                 sheet.shown = True
@@ -156,30 +158,23 @@ class _PlanFile:
             return False
         # of columns with names that a stranger chose nothing is shown before a row of numbers
         sheet.shown = not self.others and all(_NAME.fullmatch(cell.text) for cell in header)
-        place = self._placed(header)
+        place = {cell.text: k for k, cell in reversed([*enumerate(header)]) if cell.text in self.wanted}
+        for k, cell in enumerate(header):
+            if place.get(cell.text, k) < k:
+                sheet.fail(cell, codes.PLAN_COLUMNS, f"the column {cell.text} occurs twice", "keep one")
         missing = [name for name in self.wanted if name not in place]
-        if missing and not sheet.findings:
+        strange = [] if self.others else [cell for cell in header if cell.text not in self.wanted]
+        if (missing or strange) and not sheet.findings:
             what = "a column" if len(missing) == 1 else "columns"
-            message = f"the plan file lacks {what} {', '.join(missing)}"
-            sheet.fail(header[0], codes.PLAN_COLUMNS, message, self._all())
+            names = ", ".join(cell.text for cell in strange)[:80] if sheet.shown else "others"
+            told = [f"lacks {what} {', '.join(missing)}"] * bool(missing)
+            told += [f"has {names}, neither t nor state nor input"] * bool(strange)
+            own = f"{missing[0]}: {strange[0].text if sheet.shown and strange else 'NAME'}" if missing else ""
+            help = f"{self._all()}; trajectory.columns gives others, and skips some: columns: {{{own}}}"
+            message, where = f"the plan file {' and '.join(told)}", (strange or header)[0]
+            sheet.fail(where, codes.PLAN_COLUMNS, message, help)
         self.width, self.places = len(header), [place.get(name, 0) for name in self.wanted]
         return not sheet.findings
-
-    def _placed(self, header: list[Cell]) -> dict[str, int]:
-        """The columns by name; those that occur twice are findings, and so are others, unless there may be some."""
-        place: dict[str, int] = {}
-        for index, cell in enumerate(header):
-            if cell.text in place:
-                self.sheet.fail(cell, codes.PLAN_COLUMNS, f"the column {cell.text} occurs twice", "keep one")
-            elif cell.text in self.wanted:
-                place[cell.text] = index
-            elif not self.others:
-                said = f"{cell.text!r}" if _NAME.fullmatch(cell.text) else f"the name of column {index + 1}"
-                message = f"{said} is neither t nor a state nor an input"
-                help = suggestion(cell.text, self.wanted, what="columns") if self.sheet.shown else self._all()
-                help += "; trajectory.columns names columns, and skips others"
-                self.sheet.fail(cell, codes.PLAN_COLUMNS, message, help)
-        return place
 
     def _all(self) -> str:
         return f"the first line names the columns: {','.join(self.wanted)}"
