@@ -167,7 +167,9 @@ class Settings(Kind):
 
         if isinstance(value, Mapping):
             return value
-        return each_of(value, lambda own: Setting.of(own) if isinstance(own, str) else own)
+        items = [value] if isinstance(value, str) or not isinstance(value, Iterable) else value
+        place = self.called if asker().options else name
+        return each_of(items, lambda x: x if isinstance(x, Setting) else Setting.of(text_of(name, x), place))
 
 
 @dataclass(frozen=True)
@@ -289,6 +291,8 @@ def question(words: Words, *pairs: tuple[str, str]) -> Callable[[Callable[P, R]]
                 raise TypeError(f"{function.__name__}() {error}; it takes {known}") from None
             bound.apply_defaults()
             bound.arguments |= read(kinds, bound.arguments, pairs)
+            if not callable(progress := bound.arguments.get("progress") or id):
+                refuse("progress", "", f"{shown(progress)} cannot be called with steps", code="TC106")
             with asked_by(words=kinds, given=bound.arguments):
                 return function(*bound.args, **bound.kwargs)
 
@@ -375,9 +379,9 @@ def require_installed(library: str, extra: str, what: str) -> None:
         raise SpecError([Finding(code="TC122", message=f"{what} {library}", help=help)])
 
 
-def refuse(name: str, text: str, message: str, help: str = "") -> NoReturn:
+def refuse(name: str, text: str, message: str, help: str = "", *, code: str = "TC112") -> NoReturn:
     """Raises the `SpecError` about the value of an argument."""
-    raise SpecError([_finding(name, text, message, help)])
+    raise SpecError([_finding(name, text, message, help, code=code)])
 
 
 def _finding(

@@ -660,3 +660,30 @@ def test_a_certification_ends_at_its_deadline():
         tc.certify(DATA, deadline=1e-6)
     assert caught.value.exit_code == 4
     assert tc.certify(DATA, conditions="a", deadline=100).certified
+
+
+@pytest.mark.parametrize(
+    ("code", "ask"),
+    [
+        ("TC106", lambda: tc.load(DATA, settings=3)),
+        ("TC106", lambda: tc.load(DATA, settings=["a"])),
+        ("TC106", lambda: tc.verify(DATA, np.eye(2))),
+        ("TC106", lambda: tc.certify(DATA, metric=3)),
+        ("TC106", lambda: tc.certify(DATA, progress=3)),
+        ("TC106", lambda: tc.sweep(DATA, {"tube.epsilon": 0.1}, folder="x")),
+        ("TC106", lambda: certified().plot_tube("x")),
+        ("TC120", lambda: tc.report(certified()).save_figures(__file__)),
+        ("TC112", lambda: certified().curve("X")),
+        ("TC112", lambda: certified().constants["hh"]),
+        ("TC112", lambda: certified().limits["u"]),
+    ],
+)
+def test_what_a_user_can_cause_is_an_error_of_tubecert(code, ask):
+    """These were errors of Python, which say nothing of the question."""
+    assert refused(code, ask).message
+
+
+def test_names_that_there_are_not_are_told_those_that_there_are():
+    with pytest.raises(KeyError, match=r"nothing called 'hh'(.|\n)*did you mean h\?"):
+        certified().constants["hh"]
+    assert "hh" not in certified().constants

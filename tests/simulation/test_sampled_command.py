@@ -47,7 +47,7 @@ def test_the_same_from_code_of_a_family(files):
     assert "attained" in found._repr_html_()
     assert found.figure("plane").axes
     assert len(found.figure("states").axes) == len(found.figure("tube_use").axes)
-    with pytest.raises(KeyError, match="profile is no figure; there are tube_use, plane, states, inputs"):
+    with pytest.raises(KeyError, match="there are: inputs, plane, states, tube_use"):
         found.figure("profile")
     names = found.save("a")
     assert found.save("b") == names

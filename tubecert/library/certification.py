@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 from tubecert.certificate import file
 from tubecert.certificate.result import Bound, Certificate, InputData, MetricData, Result
 from tubecert.enclosure.interval import Array
-from tubecert.kinds import name_of
 from tubecert.kinds.kind import SectionData
+from tubecert.letters import NAMES
+from tubecert.library.shown import Known
 from tubecert.library.specification import Specification
 from tubecert.library.stated import Stated, array, axes_of, rounded_up
 from tubecert.records import Json
@@ -104,7 +105,9 @@ class Certification(Stated[Certificate]):
 
         Raises `KeyError` for a kind that there is not.
         """
-        return self.result.sections.get(name_of(kind).key)
+        return self.result.sections.get(
+            Known((word, name.key) for name in NAMES for word in (name.letter, name.option, name.key))[kind]
+        )
 
     # the tube
 
@@ -121,12 +124,12 @@ class Certification(Stated[Certificate]):
     @property
     def constants(self) -> Mapping[str, Bound]:
         """The constants of the proof: `below` and `above`, `symbol`, `unit`, `equation`, `at`."""
-        return MappingProxyType(dict(self.result.constants))
+        return MappingProxyType(Known(self.result.constants))
 
     @property
     def limits(self) -> Mapping[str, InputData]:
         """What is proven of each input that has limits, by its name."""
-        return MappingProxyType({item.input: item for item in self.result.inputs})
+        return MappingProxyType(Known((item.input, item) for item in self.result.inputs))
 
     @property
     def metric(self) -> MetricData | None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import Any
 
+from tubecert.asking import text_of
 from tubecert.controller.data import data_of
 from tubecert.controller.folder import files_of, write
 from tubecert.controller.plans import refused
@@ -40,6 +40,6 @@ def export(result: Stated[Any] | File, folder: File) -> Exported:
         message = "it is proven for an input of the plan that changes within a sample, and code holds it"
         raise refused(message, "certify with hardware: {hold: middle}, which is how a computer holds it")
     data = data_of(certificate)
-    target, files = os.fspath(folder), files_of(data)
+    target, files = text_of("folder", folder), files_of(data)
     write(target, files)
     return Exported(folder=target, files=tuple(sorted(files)), work=data.work)

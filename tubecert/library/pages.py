@@ -10,12 +10,12 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Final
 
 from tubecert import files
-from tubecert.asking import Text, question
+from tubecert.asking import Text, question, text_of
 from tubecert.certificate.file import write_bytes
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.reading import certificate_of
-from tubecert.library.shown import Paged
+from tubecert.library.shown import Paged, refused
 from tubecert.library.specification import File
 from tubecert.report.page import Page
 from tubecert.report.page_simulation import TITLES, Simulated
@@ -52,10 +52,14 @@ class Report(Paged):
         data = {f"{each.key}.svg": svg_file(each).encode() for each in told}
         endings = ("pdf", "png") if find_spec("matplotlib") is not None else ()
         data |= {f"{each.key}.{own}": painted(own, each) for each in told for own in endings}
-        os.makedirs(folder, exist_ok=True)
+        target = text_of("folder", folder)
+        try:
+            os.makedirs(target, exist_ok=True)
+        except OSError as error:
+            raise refused(f"cannot write into {target}: {error.strerror}", "choose another folder") from None
         data["captions.md"] = "".join(f"- {each.key}: {each.told}\n" for each in told).encode()
         for name, content in data.items():
-            write_bytes(os.path.join(os.fspath(folder), name), content, self.remedy)
+            write_bytes(os.path.join(target, name), content, self.remedy)
         return list(data)
 
     def __repr__(self) -> str:

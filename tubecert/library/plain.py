@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
-from typing import Any, Final, NoReturn, Protocol, TypeAlias, runtime_checkable
+from collections.abc import Mapping
+from typing import Any, Final, NoReturn, TypeAlias
 
 from tubecert.asking import plain_number, shown
 from tubecert.errors import SpecError
@@ -25,17 +25,6 @@ _VECTORS: Final = (  # keys for which a matrix with one column, or one row, stan
     "trajectory.start", "trajectory.target", "initial_state.at",
 )  # fmt: skip
 _ATOMS: Final = ("is_Symbol", "is_Rational", "is_Float")
-
-
-@runtime_checkable
-class _Expression(Protocol):
-    """An expression of sympy."""
-
-    free_symbols: set[object]
-
-    def atoms(self) -> Iterable[object]: ...
-
-    def xreplace(self, rule: Mapping[object, object]) -> _Expression: ...
 
 
 def document_text(data: Data) -> str:
@@ -64,7 +53,7 @@ def _plain(value: object, path: str, depth: int) -> Plain:
     if hasattr(value, "tolist"):  # an array, or a matrix of sympy
         found = _plain(value.tolist(), path, depth + 1)
         return _vector(found) if path in _VECTORS else found
-    if isinstance(value, _Expression):
+    if hasattr(value, "free_symbols") and hasattr(value, "xreplace"):
         return _expression(value, path)
     message = f"{shown(value)} has no place in a specification"
     return _refuse(path, message, "give a text, a number, a list or a mapping")
@@ -98,7 +87,7 @@ def _key(key: object, path: str) -> str:
     return _refuse(path, f"the key {shown(key)} is no name", "give a text")
 
 
-def _expression(value: _Expression, path: str) -> str:
+def _expression(value: Any, path: str) -> str:
     """What an expression of sympy prints, if that means the same here; floats are their shortest decimals."""
     for atom in value.atoms():
         _check_atom(atom, path)

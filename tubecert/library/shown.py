@@ -6,17 +6,20 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import ClassVar, Final, TypeVar
 
 from tubecert.asking import text_of
 from tubecert.certificate.file import KIND, STDOUT, same_file, write_text
-from tubecert.errors import ExitCode, TargetError, TubecertError
+from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
+from tubecert.expression import suggestion
 from tubecert.files import read
 from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.report import html, markdown
 from tubecert.report.page import Page
 from tubecert.report.text import Rows, headline
+
+T = TypeVar("T")
 
 # of what is written: how its text begins, else the keys that it has as JSON
 _BEGINS: Final = {"html": "<!DOCTYPE html>", "markdown": "#", "csv": "quantity,"}
@@ -25,6 +28,21 @@ _KEYS: Final = {
     "metric file": {"format", "solver", "verified_on"},
     "json": {"certificates", "quantities", "differences"},
 }
+
+
+class UnknownNameError(SpecError, KeyError):
+    """A name that there is not: an error of tubecert, and that of a mapping."""
+
+    __str__ = Exception.__str__
+
+
+class Known(dict[str, T]):
+    """Values by name, which tells the names where there is no such one."""
+
+    def __missing__(self, name: str) -> T:
+        help = suggestion(str(name), self, what="there are") if self else "there is none"
+        message = f"there is nothing called {visible(str(name))[:60]!r}"
+        raise UnknownNameError([Finding(code="TC112", message=message, help=help)])
 
 
 def refused(message: str, help: str = "choose another file with -o FILE") -> TargetError:

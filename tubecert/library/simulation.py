@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -11,8 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
+from tubecert.asking import text_of
 from tubecert.errors import ExitCode
-from tubecert.library.shown import Shown
+from tubecert.library.shown import Known, Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,13 +71,10 @@ class _Campaign(Shown):
         """
         from tubecert.simulation.figures import drawn
 
-        drawers, own = import_module(self.drawn_in).DRAWERS, self.within.get(name, name)
-        if own not in drawers:
-            raise KeyError(f"{name} is no figure; there are {', '.join([*drawers, *self.within])}")
+        drawers = import_module(self.drawn_in).DRAWERS
+        own = Known({each: each for each in drawers} | dict(self.within))[name]
         found = drawn(drawers, own, self.campaign)
-        if found is None:
-            raise KeyError(f"{name}: there is nothing that it could show")
-        return found
+        return Known({})[name] if found is None else found
 
     def save(self, folder: File) -> list[str]:
         """Write summary, runs and, of a whole campaign, figures into a folder, as the command does; their names.
@@ -86,10 +83,10 @@ class _Campaign(Shown):
         """
         from tubecert.simulation.folder import prepared, written_to
 
-        own = import_module(self.drawn_in)
-        with prepared(os.fspath(folder)):
+        own, target = import_module(self.drawn_in), text_of("folder", folder)
+        with prepared(target):
             outdated = [f"{name}.png" for name in own.DRAWERS]
-            return written_to(os.fspath(folder), self.summary, own.files(self.campaign), outdated)
+            return written_to(target, self.summary, own.files(self.campaign), outdated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -118,7 +115,7 @@ class Simulation(_Campaign):
 
         Raises `KeyError` for a loop that was not simulated.
         """
-        return dict(zip(self.controllers, self.campaign.loops, strict=True))[controller].runs
+        return Known(zip(self.controllers, self.campaign.loops, strict=True))[controller].runs
 
     def states(self, controller: str) -> Array:
         """The states (K, n) of that run."""

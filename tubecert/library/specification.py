@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from tubecert.asking import asker, named, text_of
+from tubecert.asking import SETTINGS, asker, named, text_of
 from tubecert.certificate.effective import Effective
 from tubecert.certificate.file import digest
 from tubecert.errors import SpecError
@@ -139,7 +139,7 @@ def require_once(settings: Iterable[Setting]) -> None:
 def settings_of(given: Data | Sequence[Setting]) -> list[Setting]:
     """Keys that are set, with the texts of their values; raises `SpecError`."""
     if not isinstance(given, Mapping):
-        return list(given)
+        return list(SETTINGS.read(named("settings"), given))
     texts = (f"{key}={plain.entry_text(value, str(key))}" for key, value in given.items())
     return [Setting.of(text, "settings") for text in texts]
 

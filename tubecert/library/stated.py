@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from tubecert.asking import require_installed, text_of
+from tubecert.asking import refuse, require_installed, shown, text_of
 from tubecert.certificate import file
 from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
@@ -136,6 +136,8 @@ class Stated(Shown, Generic[C]):
 def axes_of(ax: Axes | None) -> Axes:
     """The axes to draw into; new ones of pyplot, which notebooks show, if there are none."""
     if ax is not None:
+        if not hasattr(ax, "plot"):
+            refuse("ax", "", f"{shown(ax)} is no axes of matplotlib", code="TC106")
         return ax
     require_installed("matplotlib", "simulate", "figures need")
     import matplotlib.pyplot as plt

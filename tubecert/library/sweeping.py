@@ -17,7 +17,7 @@ from tubecert.executor import chosen
 from tubecert.findings import Finding
 from tubecert.library.certifying import BUDGET, DECIDING, METRIC_NAME, SCHEDULER
 from tubecert.library.reading import read
-from tubecert.library.shown import Shown
+from tubecert.library.shown import Known, Shown
 from tubecert.library.specification import (
     NAME,
     File,
@@ -112,16 +112,15 @@ class Swept(Shown):
         """
         from tubecert.library.stated import array
 
-        if key in self.keys:
-            axis = self.table.axes[self.keys.index(key)]
+        rows = self.table.rows
+        numbers = {
+            each.key: [None if (own := row.found.get(each.key)) is None else own.number for row in rows]
+            for each in self.table.columns
+        }
+        for axis in self.table.axes:
             values = dict(zip(axis.texts, axis.numbers or (), strict=False))
-            found = [values.get(each.settings[key]) for each in self.points]
-        elif any(each.key == key for each in self.table.columns):
-            quantities = [row.found.get(key) for row in self.table.rows]
-            found = [None if each is None else each.number for each in quantities]
-        else:
-            raise KeyError(key)
-        return array([float("nan") if number is None else number for number in found])
+            numbers[axis.path] = [values.get(each.settings[axis.path]) for each in self.points]
+        return array([float("nan") if number is None else number for number in Known(numbers)[key]])
 
     @property
     def csv(self) -> str:
@@ -243,6 +242,9 @@ def _axes(over: Mapping[str, Range] | Iterable[str]) -> list[Axis]:
 def _range(key: str, values: Range) -> str:
     if isinstance(values, str):
         return values
+    if not isinstance(values, Iterable):
+        form = "give values, or a text such as .1:.6:6"
+        asking.refuse(key, "", f"{asking.shown(values)} is no range", form, code="TC106")
     return ",".join(asking.text_of_number(each, key) for each in values)
 
 
