@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,14 +14,17 @@ from hypothesis import strategies as st
 from texts import CONFIGS
 
 from tubecert import pipeline
+from tubecert.certificate.result import MetricRow
 from tubecert.claims.advice import ConstantInputs, MeasureTube
 from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
 from tubecert.claims.statements import TubeInSafeSet
+from tubecert.enclosure.constant import Constant
 from tubecert.expression import scan
 from tubecert.model import build
 from tubecert.pipeline import Deadline, Listeners, Options, synthesis
 from tubecert.pipeline.climb import Climb, slow_scale
 from tubecert.pipeline.synthesised import Row, Synthesised
+from tubecert.report.synthesis import _compared
 from tubecert.spec import Synthesis, load, load_text
 from tubecert.verdict import Verdict
 
@@ -367,3 +371,17 @@ def test_advice_costs_no_more_than_the_search():
     found = run.run(table=False)
     assert found.reason.relax
     assert spent[0].rounds <= max(run.ladder.rounds, 30)
+
+
+def test_the_metric_that_was_chosen_leads_the_table():
+    """A first screen had the two slowest of nine, and marked none."""
+    proven = Constant(below=4.5, above=4.6)
+    rows = [
+        MetricRow(rate=Fraction(n), floor="identity", degree=0, condition_number=n + 1.6) for n in (1, 2, 3)
+    ]
+    table = _compared(rows, SimpleNamespace(rate=Fraction(3), condition_number=proven))
+    assert [[cell.text for cell in row[:2]] for row in table.rows] == [
+        ["3", "kappa, chosen"],
+        ["1", "kappa"],
+        ["2", "kappa"],
+    ]

@@ -70,7 +70,7 @@ def _first(data: SearchData, file: MetricFile | None, states: Sequence[str]) -> 
         helped = ("at", place(states, reason.at) if reason.at else ""), ("help", advice(reason.relax))
         yield Facts.of((what, told) for what, told in helped if told)
     if data.table:
-        yield _compared(data.table)
+        yield _compared(data.table, file)
     if data.limits is not None and (lines := tuple(_limits(data.limits))):
         yield Items(title="What limits the rate", items=lines)
     if data.cut is not None:
@@ -102,15 +102,18 @@ def _limits(limits: RateLimits) -> Iterator[str]:
         yield f"{side}: at {exact(limit.rate)} 1/s {_CAUSES[limit.cause].format(more=more)}"
 
 
-def _compared(found: Sequence[MetricRow]) -> Table:
-    """A metric a row."""
+def _compared(found: Sequence[MetricRow], file: MetricFile | None) -> Table:
+    """A metric a row: first, where no screen cuts it off, the one that was chosen."""
+    best = None if file is None else (file.rate, up(file.condition_number.above))
+    chosen = [row for row in found if (row.rate, up(row.condition_number)) == best]
+    found = [*chosen, *(row for row in found if row not in chosen)]
     heads = ["least", ">kappa", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "!verdict"]
     degrees = len({row.degree for row in found}) > 1  # else all rows of a rate differ by what is least
     rows = (
         (
             exact(row.rate),
             *([str(row.degree)] if degrees else []),
-            FLOORS[row.floor],
+            f"{FLOORS[row.floor]}{', chosen' if row in chosen else ''}",
             up(row.condition_number),
             *map(up, (row.input_gain, row.rho, row.bandwidth, row.adaptation_rate)),
             row.verdict or "",
