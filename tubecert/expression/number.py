@@ -75,10 +75,7 @@ def _check_foreign(text: str, word: str) -> None:
     """Words that are no numbers, and numbers as they are written elsewhere."""
     bare = word.lower().lstrip("+-.")
     if bare in _NOT_FINITE:
-        help = "write a finite number"
-        if "nan" not in bare:
-            help += "; for a claim for all time leave trajectory.horizon out, of an input without limits its entry"
-        raise _refused(text, f"{word} is not a finite number", help)
+        raise _refused(text, f"{word} is not a finite number", "write a finite number")
     if bare in _NOT_NUMBERS or not word:
         what = f"{word} is not a number" if word else "a number is missing"
         raise _refused(text, what, "write a number such as 0.1 or 1e-3")

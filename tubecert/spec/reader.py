@@ -38,6 +38,10 @@ T = TypeVar("T")
 
 _DECIMAL = re.compile(r"[+-]?[0-9]+(\.[0-9]*)?")
 _BOUNDS: Final = {"above": (">", gt), "least": (">=", ge), "most": ("<=", le)}
+_ENDLESS: Final = {  # what to do where a number that is not finite has a meaning
+    "trajectory.horizon": "; for a claim for all time leave trajectory.horizon out",
+    "limits": "; of an input without limits its entry is left out",
+}
 _CODE_OF_KIND = {
     "syntax": codes.EXPRESSION,
     "symbol": codes.UNKNOWN_SYMBOL,
@@ -185,6 +189,8 @@ class Field:
             value = parse_number(self.node.text, parameters, side)
         except ExpressionError as error:
             error.help = elsewhere("numbers").get(self.node.text, error.help)
+            if self.node.text.lower().lstrip("+-.").startswith(("inf", "oo", "forever")):
+                error.help += next((more for key, more in _ENDLESS.items() if self.path.startswith(key)), "")
             return self._expression_error(error, codes.NUMBER)
         if extreme := out_of_range(value):
             return self.fail(codes.LIMIT, f"{self.path} is {extreme}", MODERATE)
