@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, Final, TypeVar
 
-from tubecert.asking import text_of
+from tubecert.asking import asker, text_of
 from tubecert.certificate.file import KIND, STDOUT, same_file, write_text
 from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
 from tubecert.expression import suggestion
@@ -54,7 +54,7 @@ def spare(
     target: str,
     what: str = "",
     inputs: Mapping[str, str | Path | None] = {},
-    help: str = "choose another file",
+    help: str = "",
 ) -> None:
     """Raise `TargetError` for a target that would take the place of an input, or of what is no `what` of tubecert.
 
@@ -62,6 +62,7 @@ def spare(
     """
     if target == STDOUT:
         return
+    help = help or ("choose another file with -o FILE" if asker().options else "choose another file")
     for name, source in inputs.items():
         if source is not None and (
             os.path.abspath(source) == os.path.abspath(target) or same_file(target, source)
