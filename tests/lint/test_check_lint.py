@@ -96,6 +96,7 @@ CASES = {
     "an output wished for": ("TC416", "15:33", [(FROM_METRIC, WISHES), ("  f: [", "  outputs: {s: p - v}\n  f: [")]),
     "a point that moves": ("TC404", "12:52", [(FROM_METRIC, MACHINE), ("input: [0]", "input: [1]")]),
     "held automatically": ("TC417", "12:37", [("at: [0, 0], input: [0]", "at: auto, near: [0.1, 0]")]),
+    "an exact sensor": ("TC418", "14:30", [(FROM_METRIC, MACHINE.replace("rate: 500", "rate: 500, noise: {p: 1}"))]),
     "a start beyond a wish": ("TC405", "13:16", [(FROM_METRIC, WISHES.replace(", s", ", v")), (START, ALONG)]),
     "a start without room": ("TC405", "13:16", [(FROM_METRIC, MACHINE), ("{at: [0, 0]}", "{within: 1.2}")]),
     "far obstacle": ("TC409", "19:5", [(TUBE, TUBE + "\nobstacles:\n  - disc: {center: [9, 0], radius: 0.2}")]),
@@ -269,7 +270,7 @@ def test_a_rounded_point_is_told_to_be_one():
     """It was told to be no equilibrium, in the words of an input that is forgotten."""
     [finding] = found(changed(("input: [0]", "input: [0.0001]")))
     assert (finding.code, finding.severity) == ("TC404", Severity.NOTE)
-    assert re.search(r"equilibrium up to a rounding.*\(v would move\), 0\.\d+ % of", finding.message)
+    assert re.search(r"equilibrium up to a rounding.*\(moves v by \S+ per s\), 0\.\d+ % of", finding.message)
     assert finding.help.startswith("nothing is wrong")
     assert "more digits (input: [" in finding.help
     [finding] = found(changed(("input: [0]", "input: [1]")))
@@ -324,7 +325,9 @@ def test_at_auto_is_the_equilibrium_near_a_point_in_exact_numbers():
         load_text(auto)
     )
     [note] = [item for item in found(auto) if item.code == "TC417"]
-    moved = f"which moves a by {near(float(a) - 3.18, 2)}, b by {near(float(b) - 4.96, 2)} from near"
+    moved = (
+        f"which moves a by {near(float(a) - 3.18, 2)}, b by {near(float(b) - 4.96, 2)} from trajectory.near"
+    )
     assert (note.severity, note.message.partition(", ")[2][-len(moved) :]) == (Severity.NOTE, moved)
     middle = canonical(load_text(TANKS.replace("at: [3.18, 4.96], input: [0.892]", "at: auto")))
     assert abs(Fraction(middle["trajectory"]["at"][0]) - 3) < Fraction("0.3")
@@ -449,3 +452,32 @@ def test_customary_names_are_not_confusable():
     assert found(names) == []
     names = changed(("{k: 2}", "{l1: 1, I_1: 0.2, ll: 2}"), ("-k*p", "-l1*p*I_1*ll"))
     assert [item.code for item in found(names)] == ["TC131"]  # ll looks like l1
+
+
+def test_a_note_names_the_states_that_are_measured_exactly_unless_that_is_written():
+    for noise, said in (("{p: 0.01}", ["measured exactly: v"]), ("{p: 0.01, v: 0}", []), ("0.01", [])):
+        machine = MACHINE.replace("rate: 500", f"rate: 500, noise: {noise}")
+        findings = found(changed((FROM_METRIC, machine)))
+        assert [item.message.partition(";")[0] for item in findings if item.code == "TC418"] == said
+
+
+def test_what_misses_its_equations_names_the_one_that_is_missed_most(tmp_path):
+    """A length of m/s, rad/s^2 and A/s says little."""
+    units = ("  states: [p, v]", "  units: {p: m, v: m/s, u: N}\n  states: [p, v]")
+    for changes, words in (
+        ([(HELD, MOVING % "0"), (START, ALONG)], "most in v' by 0.707 m/s per s at t ="),
+        ([("input: [0]", "input: [1]")], "(moves v by 1 m/s per s)"),
+    ):
+        assert any(words in item.message for item in found(changed(units, *changes))), changes
+    (tmp_path / "plan.csv").write_text("t,p,v,u\n0,0,0,0\n1,0.5,0,0\n")
+    told = changed(units, (HELD, "{kind: csv, file: plan.csv}"), (START, ""))
+    (tmp_path / "base.yaml").write_text(told)
+    [finding] = [i for i in pipeline.inspect(load(str(tmp_path / "base.yaml"))) if i.code == "TC407"]
+    assert "most in p' by" in finding.message
+
+
+def test_a_start_outside_of_the_safe_set_is_located_in_the_plan_that_has_it(tmp_path):
+    (tmp_path / "plan.csv").write_text("t,p,v,u\n0,2000,0,0\n1,2000,0,0\n")
+    (tmp_path / "base.yaml").write_text(changed((HELD, "{kind: csv, file: plan.csv}"), (START, "")))
+    [finding] = [i for i in pipeline.inspect(load(str(tmp_path / "base.yaml"))) if i.code == "TC405"]
+    assert str(finding.location) == f"{tmp_path / 'plan.csv'}:2:1"

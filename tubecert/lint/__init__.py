@@ -15,14 +15,16 @@ would refute, a warning what is hardly meant, a note what is worth knowing. Trus
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from tubecert.enclosure.branch_and_bound import Effort
 from tubecert.enclosure.domain import Range
 from tubecert.findings import Finding, Severity
-from tubecert.lint.codes import LEFT_OUT, finding
+from tubecert.lint.codes import EXACT_SENSORS, LEFT_OUT, finding
 from tubecert.lint.metric import metric_findings, reach_findings
 from tubecert.lint.names import name_findings
 from tubecert.lint.plan import plan_findings
@@ -45,25 +47,23 @@ def lint(spec: Spec, time: Range | None, effort: Effort) -> list[Finding]:
     return findings
 
 
-def _left_out(spec: Spec) -> list[Finding]:
-    """What a specification says that no certificate of its kind is about."""
+def _left_out(spec: Spec) -> Iterator[Finding]:
+    """What a specification says that no certificate of its kind is about; sensors of which it says nothing."""
+    note = partial(finding, spec, severity=Severity.NOTE)
     if spec.hardware is None:
         message = "parameters known by ranges stand in B, of which nothing is proven in continuous time"
         help = (
             "name the computer, hardware: {rate: 500}, in place of the metric: its loop is proven with them"
         )
-        told = {"system.parameters": (message, help)} if spec.gained else {}
-    else:
-        named = {output.name for output in spec.outputs}
-        told = {
-            f"tube.half_widths.{name}": (
-                f"the half-width of the output {name} is asked for beside hardware; nothing is designed for it",
-                "it decides the verdict; what the design follows are wishes for states",
-            )
-            for name, _ in spec.tube.half_widths
-            if name in named
-        }
-    return [
-        finding(spec, LEFT_OUT, key, message, help, severity=Severity.NOTE)
-        for key, (message, help) in told.items()
-    ]
+        yield from [note(LEFT_OUT, "system.parameters", message, help)] if spec.gained else []
+        return
+    for output in spec.outputs:
+        if output.name in dict(spec.tube.half_widths):
+            message = f"nothing is designed for the half-width of the output {output.name} beside hardware"
+            help = "it decides the verdict; what the design follows are wishes for states"
+            yield note(LEFT_OUT, f"tube.half_widths.{output.name}", message, help)
+    exact = [name for name in spec.states if f"hardware.noise.{name}" not in spec.locations]
+    if isinstance(spec.hardware.noise, tuple) and exact:
+        message = f"measured exactly: {', '.join(exact)}; hardware.noise names other states alone"
+        help = f"give the error of their sensors, or write {exact[0]}: 0 if that is meant"
+        yield note(EXACT_SENSORS, "hardware.noise", message, help)

@@ -35,6 +35,7 @@ PLAN_EXCHANGED: Final = "TC414"
 PLAN_BEYOND_LIMITS: Final = "TC415"
 LEFT_OUT: Final = "TC416"
 HELD: Final = "TC417"
+EXACT_SENSORS: Final = "TC418"
 
 NOTABLE_DEFECT: Final = 0.02  # share of the tube that a plan's defect may take
 

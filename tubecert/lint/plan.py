@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import product
 
@@ -18,13 +18,13 @@ import numpy as np
 from tubecert.digits import near, up
 from tubecert.enclosure.interval import Array
 from tubecert.enclosure.tape import Tape
-from tubecert.expression import number_text
+from tubecert.expression import derivatives, number_text
 from tubecert.findings import Finding, Severity
 from tubecert.lint import codes
 from tubecert.lint.codes import finding
 from tubecert.lint.names import turned
 from tubecert.lint.room import least_radius, room_findings
-from tubecert.lint.table import paid, table_findings
+from tubecert.lint.table import most_of, paid, rated, table_findings
 from tubecert.model import TIME, ControlAffineModel, build
 from tubecert.spec import Obstacle, Spec
 from tubecert.spec.system import Plant, equilibrium
@@ -102,7 +102,7 @@ def held(spec: Spec) -> Iterator[Finding]:
     point, inputs = (_listed(each, 4) for each in (x, u))
     pairs = zip(spec.states, x, plan.about, strict=True)
     moved = [f"{name} by {near(float(own - at), 2)}" for name, own, at in pairs if own != at]
-    given = "near" if "trajectory.near" in spec.locations else "the middle of the safe set"
+    given = "trajectory.near" if "trajectory.near" in spec.locations else "the middle of the safe set"
     apart = f", which moves {', '.join(moved)} from {given}" if moved else f", which is {given}"
     message, help = f"at: auto holds {point} with input {inputs}{apart}", "they are kept to 20 digits"
     yield finding(spec, codes.HELD, "trajectory.at", message, help, severity=Severity.NOTE)
@@ -126,7 +126,10 @@ def _start(spec: Spec) -> Iterator[Finding]:
             path = f"initial_state.{'box' if spec.start_box else 'at'}[{i}]"
             message = f"the initial state is not in the safe set: {name} = {number_text(value)[:40]}"
             help = f"the safe set has {name} in [{number_text(low)[:40]}, {number_text(high)[:40]}]"
-            yield finding(spec, codes.START_OUTSIDE, path, message, help, severity=Severity.ERROR)
+            error = finding(spec, codes.START_OUTSIDE, path, message, help, severity=Severity.ERROR)
+            rows = spec.trajectory.table.rows if spec.trajectory.table else ()
+            place = error.location or (rows[0] if rows else spec.location("trajectory"))  # that of the plan
+            yield replace(error, location=place)
 
 
 def _outside(spec: Spec, curve: Curve) -> Iterator[Finding]:
@@ -143,7 +146,7 @@ def _outside(spec: Spec, curve: Curve) -> Iterator[Finding]:
 
 
 def _beyond_limits(spec: Spec, curve: Curve) -> Iterator[Finding]:
-    """Inputs of the plan itself that are not within the limits: what feedback and adaptation need comes on top."""
+    """Inputs of the plan itself that are not within the limits: what a controller adds comes on top."""
     plan = spec.trajectory
     if plan.task is not None:  # its inputs are still to be found
         return
@@ -163,7 +166,7 @@ def _beyond_limits(spec: Spec, curve: Curve) -> Iterator[Finding]:
             )
             help = (
                 f"{'hold another point' if held else 'plan with less of it'}, or give limits.{name} more room: "
-                "what feedback and adaptation need comes on top"
+                "what a controller adds comes on top"
             )
             yield finding(
                 spec, codes.PLAN_BEYOND_LIMITS, "trajectory.input" if held else "trajectory.u", message, help
@@ -176,8 +179,6 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
     drift = Tape([row[0] for row in model.drift_on_plan()], (*model.states, *model.inputs, TIME))
     rate = drift.run_floats([*x, *u, curve.t], curve.t.shape)
     if spec.trajectory.kind != "equilibrium":
-        from tubecert.expression import derivatives
-
         slope = Tape(derivatives([term.expression for term in spec.trajectory.x], TIME), (TIME,))
         rate = slope.run_floats([curve.t], curve.t.shape) - rate
     size = np.linalg.norm(rate, axis=0)
@@ -191,9 +192,10 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
     bearable = float(model.rate) * least_radius(spec) if spec.hardware is None else crossing
     notable = worst > codes.NOTABLE_DEFECT * bearable
     if spec.trajectory.kind == "equilibrium":
-        states = [name for name, value in zip(spec.states, rate[:, k], strict=True) if abs(value) > scale]
+        pairs = zip(spec.states, rate[:, k], strict=True)
+        states = [f"{name} by {rated(spec, name, value)}" for name, value in pairs if abs(value) > scale]
         near_by = held_by(spec)
-        message = f"|f + B u| = {near(worst, 3)} there ({', '.join(states)} would move)"
+        message = f"|f + B u| = {near(worst, 3)} there (moves {', '.join(states)})"
         if notable:
             message = f"the point is no equilibrium: {message}"
             exact = f" (at: auto, near: {_listed(curve.x[0], 4)} is that to 20 digits)"
@@ -209,7 +211,7 @@ def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Fin
         severity = Severity.WARNING if notable else Severity.NOTE
         yield finding(spec, codes.NO_EQUILIBRIUM, path, message, help, severity=severity)
     elif notable:
-        message = f"the plan misses x*' = f + B u* by {near(worst, 3)} at t = {near(curve.t[k], 4)} s"
+        message = f"the plan misses {most_of(spec, rate[:, k])} at t = {near(curve.t[k], 4)} s"
         help = f"correct x or u there; {paid(spec)}"
         yield finding(spec, codes.PLAN_DEFECT, "trajectory.u", message, help)
 

@@ -61,6 +61,10 @@ class _Dynamics:
 
     def defect(self, points: _Points) -> Array:
         """|x' - f - B u| in the middle of every piece, (K - 1,), in units of the states per s."""
+        return np.asarray(np.nan_to_num(np.linalg.norm(self.missed(points), axis=1), nan=np.inf))
+
+    def missed(self, points: _Points) -> Array:
+        """x' - f - B u there, (K - 1, n)."""
         t0, t1 = points.t[:-1], points.t[1:]
         h = (t1 - t0)[:, None]
         x0, x1, u0 = points.x[:-1], points.x[1:], points.u[:-1]
@@ -68,9 +72,20 @@ class _Dynamics:
         before, after = self.rate(t0, x0, u0), self.rate(t1, x1, u1)
         u = (u0 + u1) / 2 if points.between is None else points.between
         middle = self.rate((t0 + t1) / 2, (x0 + x1) / 2 + h * (before - after) / 8, u)
-        size = np.linalg.norm(1.5 * (x1 - x0) / h - (before + after) / 4 - middle, axis=1)
-        found: Array = np.nan_to_num(size, nan=np.inf)
-        return found
+        return np.asarray(1.5 * (x1 - x0) / h - (before + after) / 4 - middle)
+
+
+def rated(spec: Spec, name: str, rate: float) -> str:
+    """How fast a state is, in its unit per s."""
+    return " ".join(filter(None, (near(abs(rate), 3), dict(spec.units).get(name), "per s")))
+
+
+def most_of(spec: Spec, missed: Array) -> str:
+    """By how much x*' - f - B u* (n,) is missed, and by which state most, beside the width of the safe set."""
+    low, high = np.array(spec.safe_set, dtype=float).T
+    i = int(np.argmax(np.nan_to_num(np.abs(missed)) / (high - low)))
+    most = f"most in {spec.states[i]}' by {rated(spec, spec.states[i], missed[i])}"
+    return f"x*' = f + B u* by {near(float(np.linalg.norm(missed)), 3)}, {most}"
 
 
 def paid(spec: Spec) -> str:
@@ -120,8 +135,8 @@ def table_findings(spec: Spec, table: Table, model: ControlAffineModel, radius: 
         k = int(np.argmax(size))
         yield _finding(
             codes.PLAN_DEFECT,
-            f"the plan misses x*' = f + B u* by {near(worst, 3)} between t = {near(points.t[k], 4)} s and "
-            f"t = {near(points.t[k + 1], 4)} s",
+            f"the plan misses {most_of(spec, dynamics.missed(points)[k])} between t = {near(points.t[k], 4)} s "
+            f"and t = {near(points.t[k + 1], 4)} s",
             places[k],
             f"see whether it is a plan of this system, in its units, and give more knots there; {paid(spec)}",
         )
