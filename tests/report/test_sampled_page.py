@@ -205,13 +205,42 @@ def test_wind_of_a_bounded_rate_is_told_as_that():
     """It is compensated as h is: its share was told to be that of h, and nothing said that its rate is assumed."""
     slow = replace(sampled.NARROW, uncertainty=0.02, wind=0.0)
     filled = {"long_run": {"p": slow, "v": slow}}
-    told = ("", "h", "wind is"), (", rate: 0.1", "h and slow wind", "wind and its rate are")
+    told = ("", "h", "wind is"), (", rate: 0.1", "slow wind", "wind and its rate are")
     for rate, cause, within in told:
         own = sampled.certificate(sampled.SPEC.replace("bound: 0.05", f"bound: 0.05{rate}"))
         text = shown(replace(own, notes=replace(own.notes, **filled)), verbose=True)
         assert f"fills p     {cause} 59 %," in text
         assert f"the {within} within" in " ".join(text.split())
-    assert "h and slow wind" in remedy(LACKS["wish"], own.result.spec.effective, Notes(**filled))
+    assert "slow wind" in remedy(LACKS["wish"], own.result.spec.effective, Notes(**filled))
+
+
+@pytest.mark.parametrize(
+    ("h", "cause"),
+    [
+        ("", "parameters"),
+        ("uncertainty: {h: ['0']}\n", "parameters"),
+        ("uncertainty: {h: [v]}\n", "h and parameters"),
+    ],
+)
+def test_what_parameters_ask_is_told_as_theirs(h, cause):
+    """It is compensated as h is: its share was told to be that of h, where h is 0."""
+    text = sampled.SPEC.replace("f: [v,", "parameters: {m: [1, 2]}, f: [v,").replace('"-v"', '"-m*v"') + h
+    own = sampled.certificate(text)
+    slow = replace(sampled.NARROW, uncertainty=0.02, wind=0.0)
+    own = replace(own, notes=replace(own.notes, long_run={"p": slow, "v": slow}))
+    assert f"fills p     {cause} 59 %," in shown(own)
+    assert explained.find(cause) is not None
+    assert any(cause in str(chart) for chart in figures_of(page_of(own)).values())
+
+
+def test_a_wish_for_an_output_is_on_the_first_screen_with_what_was_found():
+    text = sampled.SPEC.replace("f: [v,", "outputs: {tip: p - v/2}, f: [v,").replace(
+        "{p: 0.15}", "{tip: 0.2}"
+    )
+    for verbose in (False, True):  # then in the table of what fills them as well
+        lines = [own.split() for own in shown(sampled.certificate(text), verbose=verbose).splitlines()]
+        found = [own[:4] for own in lines if own[:1] == ["tip"]]
+        assert found == [["tip", "0.1981", "0.051", "0.2"]] * (1 + verbose)
 
 
 def figures_of(page):

@@ -18,12 +18,11 @@ from tubecert.report.figures_axes import BOTTOM, TOP, Axis, Chart, Point
 from tubecert.report.figures_scene import Plane, over_time
 from tubecert.sampled_loop.record import Certificate, Result, Shares
 from tubecert.verdict import Verdict
-from tubecert.words.sampled_loop import SHARES, WITH_WIND, causes, percents
+from tubecert.words.sampled_loop import causes, percents
 
 _FOR_EVER: Final = 1.0  # s that are drawn of a plan without an end, beyond the start of the last stage
 _ROW: Final = 30  # units of the viewport that a bar takes
-_NAMES: Final = ("n1", "n4", "n2", "n3", "n5", "n6")
-_STYLES: Final = {**dict(zip(SHARES.values(), _NAMES, strict=True)), WITH_WIND: "n2"}
+_STYLES: Final = ("n1", "n4", "n2", "n3", "n5", "n6")  # of the shares
 
 
 def period(result: Result) -> Fraction:
@@ -148,10 +147,11 @@ def _bars(filled: Mapping[str, Shares], words: Mapping[str, str]) -> Chart:
     share, height = Axis(label="share (%)", low=0, high=100), _ROW * len(names) + TOP + BOTTOM
     caption = "Each bar is the whole of a half-width in the long run, or of what is added to an input."
     chart = Chart(key="shares", title=title, x=share, y=rows, height=height, caption=caption)
+    styles = dict(zip(words.values(), _STYLES, strict=True))
     for row, name in enumerate(names):
         at = 0
         for what, part in percents(filled[name], words).items():
             low, high = (at, row - 0.3), (at + part, row + 0.3)
-            chart.box(low, high, f"bar {_STYLES[what]}", what, f"{what} {part} %")
+            chart.box(low, high, f"bar {styles[what]}", what, f"{what} {part} %")
             at += part
     return chart

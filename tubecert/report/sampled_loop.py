@@ -5,18 +5,20 @@ In: a certificate. Out: a `Page`, which terminals, HTML, Markdown and notebooks 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import islice
 from typing import Final
 
+from tubecert.certificate.effective import Effective
 from tubecert.digits import near, up
+from tubecert.expression import derivative, parse, symbol
 from tubecert.report.claimed import NOT_RECHECKED, ends, labelled, size, started
 from tubecert.report.figures_sampled import figures, period
 from tubecert.report.page import Block, Cell, Facts, Figures, Items, Listing, Page, Section, Table
 from tubecert.report.page_origin import check_again, system
 from tubecert.report.page_simulation import Simulated, simulated_blocks
-from tubecert.sampled_loop.record import Certificate, Notes, Result
+from tubecert.sampled_loop.record import Certificate, Notes, Result, Stage
 from tubecert.verdict import Verdict
 from tubecert.words.sampled_loop import (
     assumed,
@@ -108,18 +110,35 @@ def _screen(result: Result, notes: Notes) -> Iterator[Block]:
 def _first(result: Result) -> Sequence[str]:
     """The states of the first screen: those with a wish, and others as far as there is room, in their order."""
     names, wishes = result.spec.effective.system.states, result.spec.effective.tube.half_widths
-    chosen = sorted(names, key=lambda name: name not in wishes)[:_MOST]
+    room = max(1, _MOST - len(_outputs(result.spec.effective)))
+    chosen = sorted(names, key=lambda name: name not in wishes)[:room]
     return [name for name in names if name in chosen]
 
 
+def _outputs(effective: Effective) -> dict[str, dict[str, Fraction]]:
+    """Outputs of which a half-width was asked: how much of every state each has, as a magnitude."""
+    system, known = effective.system, {name: symbol(name) for name in effective.system.states}
+    sums = {name: parse(text, symbols=known).expression for name, text in system.outputs.items()}
+    rows = {name: {x: abs(derivative(own, x).fraction) for x in known} for name, own in sums.items()}
+    return {name: row for name, row in rows.items() if name in effective.tube.half_widths}
+
+
+def _bounds(stage: Stage, outputs: Mapping[str, Mapping[str, Fraction]]) -> dict[str, Fraction]:
+    """How wide the tube is in a stage, by state, input and output."""
+    own = stage.half_widths
+    sums = {name: sum((q * own[x] for x, q in row.items()), Fraction(0)) for name, row in outputs.items()}
+    return {**own, **stage.deviations, **sums}
+
+
 def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) -> Table:
-    """Half-widths at the start, in the long run, as wished; `notes` say what fills them, inputs as well."""
+    """Half-widths at the start, in the long run, as wished, of outputs too; `notes` say what fills them, and inputs."""
     system, wishes = result.spec.effective.system, result.spec.effective.tube.half_widths
-    named = (*names, *(system.inputs if notes else ()))
+    outputs = _outputs(result.spec.effective)
+    named = (*names, *outputs, *(system.inputs if notes else ()))
     columns = [["tube" if result.verdict is Verdict.CERTIFIED else "not proven"]]
     columns[0] += [labelled(name, system) for name in named]
     for stages in filter(None, (result.tube, result.tube[1:][-1:])):  # what is never left, and the long run
-        bounds = [{**stage.half_widths, **stage.deviations} for stage in stages]
+        bounds = [_bounds(stage, outputs) for stage in stages]
         widths = (size(max(own[name] for own in bounds)) for name in named)
         columns.append([f"from {up(stages[0].start * period(result))} s", *widths])
     if wishes:
@@ -128,7 +147,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
         words = causes(result.spec.effective)
         told = {name: filling(shares, words) for name, shares in filled.items()}
         columns.append(["filled by", *(told.get(name, "") for name in named)])
-    aside = len(names) > _ROWS and not notes
+    aside = len(named) > _ROWS and not notes
     head, *rows = columns if aside else zip(*columns, strict=True)
     left = len(system.states) - len(names)
     return Table(

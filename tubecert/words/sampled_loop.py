@@ -24,7 +24,6 @@ SHARES: Final[Mapping[str, str]] = {
     "start": "start",
     "remainder": "remainder",
 }
-WITH_WIND: Final = "h and slow wind"
 _HELD: Final = {
     "middle": "in the middle of the interval in which it acts",
     "left": "where the interval begins in which it acts",
@@ -132,9 +131,15 @@ def is_alone(effective: Effective) -> bool:
 
 
 def causes(effective: Effective) -> Mapping[str, str]:
-    """The words of the shares; wind of a bounded rate is compensated as h is, and counted with it."""
-    slow = "rate" in effective.part("disturbance")
-    return {**SHARES, "uncertainty": WITH_WIND} if slow else SHARES
+    """The words of the shares; h, wind of a bounded rate and parameters are compensated, and counted, together."""
+    given, ranges = effective.part("uncertainty"), effective.system.parameters.values()
+    acts = {
+        "h": "bounds" in given or any(text != "0" for text in given.get("h", ())),
+        "slow wind": "rate" in effective.part("disturbance"),
+        "parameters": any(len(each.ends) == 2 for each in ranges),
+    }
+    slow = " and ".join(name for name, found in acts.items() if found)
+    return {**SHARES, "uncertainty": slow or SHARES["uncertainty"]}
 
 
 def percents(shares: Shares, words: Mapping[str, str]) -> dict[str, int]:
