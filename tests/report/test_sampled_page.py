@@ -34,7 +34,7 @@ from tubecert.words.sampled_loop import NOTHING, SHARES, filling, percents, reme
 TEXTS = {"cart": sampled.SPEC, "family": sampled.FAMILY, "drone": sampled.DRONE}
 KEYS = "box", "hold", "slow wind", "h and slow wind", "hardware.rate", "hardware.delay", "hardware.noise"
 LONG = re.sub(r"\bp\b", "position", sampled.SPEC)
-OF_CART = sampled.certificate().result.spec.effective
+OF_CART = sampled.certificate().result
 CLOSING = [("certificate", "cart.certificate.json"), ("next", "a"), ("", "b"), ("", "c")]
 LACKS = {
     "inputs": Lack(kind="inputs", where="F", needed=1.58, allowed=1.0),
@@ -72,7 +72,7 @@ def test_what_is_lacking_is_told_with_what_helps_and_never_as_proven(lack):
     text = shown(sampled.undecided(lack))
     assert text.startswith("undecided cart: ")
     assert len(text.splitlines()) <= 18
-    assert why(lack, OF_CART) in " ".join(text.split())
+    assert why(lack, OF_CART.spec.effective) in " ".join(text.split())
     assert "None" not in text + shown(sampled.undecided(lack), verbose=True)
     assert not [words for words in ("- of -", "\n  tube  ", "tube keeps away", "of the way") if words in text]
     assert "\n  help  " in text
@@ -211,7 +211,7 @@ def test_wind_of_a_bounded_rate_is_told_as_that():
         text = shown(replace(own, notes=replace(own.notes, **filled)), verbose=True)
         assert f"fills p     {cause} 59 %," in text
         assert f"the {within} within" in " ".join(text.split())
-    assert "slow wind" in remedy(LACKS["wish"], own.result.spec.effective, Notes(**filled))
+    assert "slow wind" in remedy(LACKS["wish"], own.result, Notes(**filled))
 
 
 @pytest.mark.parametrize(

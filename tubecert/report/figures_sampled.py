@@ -66,7 +66,7 @@ def figures(certificate: Certificate) -> Iterator[Chart]:
     if result.tube and effective.trajectory.kind != "equilibrium":
         yield from _deviations(result)
     if certificate.notes.filled:
-        yield _bars(effective.system.ordered(certificate.notes.filled), causes(effective))
+        yield _bars(effective.system.ordered(certificate.notes.filled), causes(result))
 
 
 def state_figures(certificate: Certificate) -> Iterator[Chart]:

@@ -144,7 +144,7 @@ def _widths(result: Result, names: Sequence[str], notes: Notes | None = None) ->
     if wishes:
         columns.append(["wish", *(near(wishes[name]) if name in wishes else "" for name in named)])
     if filled := notes.filled if notes else {}:
-        words = causes(result.spec.effective)
+        words = causes(result)
         told = {name: filling(shares, words) for name, shares in filled.items()}
         columns.append(["filled by", *(told.get(name, "") for name in named)])
     aside = len(named) > _ROWS and not notes
@@ -179,7 +179,7 @@ def _worst(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     }
     if sizes:
         name = max(sizes, key=sizes.__getitem__)
-        yield f"fills {name}", filling(notes.long_run[name], causes(result.spec.effective))
+        yield f"fills {name}", filling(notes.long_run[name], causes(result))
 
 
 def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
@@ -192,11 +192,12 @@ def _obstacles(result: Result) -> Iterator[tuple[str, str]]:
 
 def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     """What fills that which lacks, and what would help."""
-    own = result.spec.effective
     for lack in result.lacks:
         if lack.where in notes.filled:
-            yield f"fills {lack.where}", filling(notes.filled[lack.where], causes(own))
-    yield from (("help", help) for help in dict.fromkeys(remedy(lack, own, notes) for lack in result.lacks))
+            yield f"fills {lack.where}", filling(notes.filled[lack.where], causes(result))
+    yield from (
+        ("help", help) for help in dict.fromkeys(remedy(lack, result, notes) for lack in result.lacks)
+    )
 
 
 def _origin(certificate: Certificate) -> Facts:

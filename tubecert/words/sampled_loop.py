@@ -99,7 +99,7 @@ def extent(result: Result) -> str:
 def lacking(result: Result, notes: Notes) -> list[tuple[str, str, str]]:
     """What lacks: its kind, why, and what would help."""
     own = result.spec.effective
-    return [(lack.kind, why(lack, own), remedy(lack, own, notes)) for lack in result.lacks]
+    return [(lack.kind, why(lack, own), remedy(lack, result, notes)) for lack in result.lacks]
 
 
 def why(lack: Lack, effective: Effective) -> str:
@@ -113,15 +113,15 @@ def why(lack: Lack, effective: Effective) -> str:
     return text.format(**told, bounds=bounds).removesuffix(": ")
 
 
-def remedy(lack: Lack, effective: Effective, notes: Notes) -> str:
+def remedy(lack: Lack, result: Result, notes: Notes) -> str:
     """What would help, by what fills the quantity that lacks."""
-    if lack.kind in _ALONE and is_alone(effective):
+    if lack.kind in _ALONE and is_alone(result.spec.effective):
         return _AUTO
     filled = notes.filled.get(lack.where)
     most = "" if filled is None else max(SHARES, key=lambda name: float(getattr(filled, name)))
     help = _HELP[lack.kind] if lack.where or lack.kind != "no_design" else _FASTER
     return help.format(
-        where=lack.where, largest=causes(effective).get(most, "noise, wind, h, delay or the start")
+        where=lack.where, largest=causes(result).get(most, "noise, wind, h, delay or the start")
     )
 
 
@@ -130,13 +130,14 @@ def is_alone(effective: Effective) -> bool:
     return effective.data.get("controller") == "none"
 
 
-def causes(effective: Effective) -> Mapping[str, str]:
-    """The words of the shares; h, wind of a bounded rate and parameters are compensated, and counted, together."""
-    given, ranges = effective.part("uncertainty"), effective.system.parameters.values()
+def causes(result: Result) -> Mapping[str, str]:
+    """The words of the shares; h, wind of a bounded rate and slow parameters are compensated, and counted, together."""
+    own = result.spec.effective
+    given, ranges = own.part("uncertainty"), [len(each.ends) for each in own.system.parameters.values()]
     acts = {
         "h": "bounds" in given or any(text != "0" for text in given.get("h", ())),
-        "slow wind": "rate" in effective.part("disturbance"),
-        "parameters": any(len(each.ends) == 2 for each in ranges),
+        "slow wind": "rate" in own.part("disturbance"),
+        "parameters": 2 in ranges and (result.recipe is None or result.recipe.parameters == "slow"),
     }
     slow = " and ".join(name for name, found in acts.items() if found)
     return {**SHARES, "uncertainty": slow or SHARES["uncertainty"]}
