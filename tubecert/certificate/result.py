@@ -30,7 +30,11 @@ from tubecert.verdict import Verdict
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricRow:
-    """One metric of a comparison; `input_gain`: that of the tube, beta/sqrt(a); `adaptation_rate`: the least of B."""
+    """One metric of a comparison; `input_gain` is beta/sqrt(a) over the tube.
+
+    `bandwidth`, `adaptation_rate` and `demand` are of the kind that decides, else of B; `demand` is Gamma |B|^2, in
+    1/s^2: where a tube has coordinates of its own they are of the metric, and Gamma alone compares nothing.
+    """
 
     rate: Fraction
     floor: Literal["identity", "input"]
@@ -42,11 +46,12 @@ class MetricRow:
     ultimate_radius: float | None = None
     adaptation_rate: float | None = None
     bandwidth: float | None = None
+    demand: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RateLimit:
-    """What is against another rate; `cause`: what kind of thing; `factor`: how many times the gains would be needed."""
+    """What is against another rate, with `factor` times the demand there; `idle` is told of the rate chosen."""
 
     rate: Fraction
     cause: Literal["distance", "overshoot", "gains", "no_metric", "idle", "input_gain", "tube"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from math import inf, isfinite, sqrt
 
 from tubecert.claims.advice import MendPlan
@@ -46,8 +47,6 @@ def judged_row(row: Row, question: Question, outputs: Mapping[str, float] | None
     verdict = overall([sections[key].verdict for key in keys])
     short = next((s for key in keys if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
-    distance = sections[DISTANCE.key]
-    least = distance.at(LEAST)
     decisive = next(
         (found for section in sections.values() if (found := _pair(question, section.data()))), None
     )
@@ -60,9 +59,9 @@ def judged_row(row: Row, question: Question, outputs: Mapping[str, float] | None
         input_gain=gain / sqrt(lower) if isfinite(gain) else None,
         rho=float(problem.rho),
         width=None if outputs is None else _width(half_widths(end), outputs),
-        ultimate_radius=distance.ultimate_radius,
-        adaptation_rate=None if least is None else float(least.recipe.adaptation_rate),
-        bandwidth=None if decisive is None or decisive.bandwidth is None else float(decisive.bandwidth),
+        ultimate_radius=sections[DISTANCE.key].ultimate_radius,
+        adaptation_rate=None if decisive is None else _float(decisive.adaptation_rate),
+        bandwidth=None if decisive is None else _float(decisive.bandwidth),
         demand=_demand(decisive, problem),
     )
 
@@ -108,13 +107,15 @@ def _pair(question: Question, section: SectionData) -> Pair | None:
     return next((pair for pair in pairs if pair.role == LEAST), pairs[0] if pairs else None)
 
 
-def _demand(pair: Pair | None, problem: TubeProblem) -> float:
-    """What a kind asks of the computer that adapts: Gamma |B|^2; else the tube.
+def _float(number: Fraction | None) -> float | None:
+    return None if number is None else float(number)
+
+
+def _demand(pair: Pair | None, problem: TubeProblem) -> float | None:
+    """What a kind asks of the computer that adapts: Gamma |B|^2, its estimator's speed squared.
 
     In a tube of its own coordinates Gamma is of these, and they are of the metric: |B|^2 in them makes it comparable.
     """
-    if pair is None:
-        return inf
-    if pair.adaptation_rate is not None:
-        return float(pair.adaptation_rate) * problem.constants.B.above**2
-    return float(problem.rho)
+    if pair is None or pair.adaptation_rate is None:
+        return None
+    return float(pair.adaptation_rate) * problem.constants.B.above**2

@@ -32,7 +32,7 @@ _NO_LESS = 0.75  # unless the second misses by less than this share of the first
 _BEYOND = 8.0  # and by no more than this many tubes
 _ROUNDS = 2  # of refinement: factors of sqrt(2), then of its root
 _BELOW = 4  # the climb starts so far below the slowest mode
-_LONGER = 1.1  # times the gain is what a metric of a lower degree may ask for
+_WORTH = 1.2  # times as much a simpler metric may ask for: what they are compared by is known to a fifth
 _ROUNDER = 0.95  # of the condition number
 _UP = 1 + 1e-9  # so that rounding down starts from what the last digits of a mode do not change
 _UNUSUAL = 64  # such a slow scale, or its inverse, is one of another unit of time
@@ -106,15 +106,16 @@ class Climb:
         return "plan" if hopeless else None
 
     def limits(self) -> RateLimits | None:
-        """What is against a slower and against a faster rate than the best; told of gains, not of the tube's width."""
+        """What is against a slower and against a faster rate than the best; told where gains are what decides."""
         best = self.best
-        if best is None or self.objective == "tube":
+        if best is None or best.adaptation_rate is None or self.objective == "tube" or self.ended:
             return None
         slower = max((rate for rate in self.tried if rate < best.rate), default=None)
         faster = min((rate for rate in self.tried if rate > best.rate), default=None)
+        end = RateLimit(rate=best.rate, cause="idle") if best.idle and slower is not None else None
         return RateLimits(
             slower=None if slower is None else self._limit(slower, best),
-            faster=None if faster is None else self._limit(faster, best),
+            faster=end if faster is None else self._limit(faster, best),
         )
 
     # -- steps ---------------------------------------------------------------------------------------------------
@@ -155,9 +156,11 @@ class Climb:
         return row
 
     def _better(self, row: Row, known: Row) -> bool:
-        """Whether a metric takes the place of another; one of a higher degree is longer, and has to be worth it."""
-        harder = replace(row, demand=_LONGER * row.demand) if row.degree > known.degree else row
-        return self._score(harder) < self._score(known)
+        """Whether a metric takes the place of another; one of a higher degree, or less round, has to be worth it."""
+        harder = row.degree > known.degree or (row.floor, known.floor) == ("input", "identity")
+        if harder and row.demand is not None:
+            row = replace(row, demand=_WORTH * row.demand)
+        return self._score(row) < self._score(known)
 
     def _around(self, best: Fraction) -> list[Fraction]:
         """Rates halfway, in their logarithms, to the neighbours that were tried."""
@@ -174,13 +177,12 @@ class Climb:
             return RateLimit(rate=rate, cause="no_metric")
         if not row.counts:
             return RateLimit(rate=rate, cause="overshoot" if _overshoots(row) else "gains")
-        if row.idle:
-            return RateLimit(rate=rate, cause="idle")
-        factor = row.demand / best.demand if 0 < best.demand < inf else None
-        if rate < best.rate:
-            return RateLimit(rate=rate, cause="distance", factor=factor)
-        grown = (row.input_gain or 0) * (best.rho or 0) > (best.input_gain or inf) * (row.rho or inf)
-        return RateLimit(rate=rate, cause="input_gain" if grown else "tube", factor=factor)
+        factor = row.demand / best.demand if row.demand and best.demand else None
+        longer = max(float(best.rate / rate), 1.0)  # a distance grows as 1/rate
+        grown = (row.input_gain or 0) * (best.rho or 0) * longer > (best.input_gain or inf) * (row.rho or inf)
+        if not grown:
+            return RateLimit(rate=rate, cause="tube", factor=factor)
+        return RateLimit(rate=rate, cause="distance" if longer > 1 else "input_gain", factor=factor)
 
 
 def slow_scale(model: ControlAffineModel, spec: Spec) -> Fraction:

@@ -43,7 +43,6 @@ class Row(MetricRow):
 
     `verdict` is that of the kinds that decide, `claim` what failed; `alone`: certificate 0 holds, whatever decides;
     `mend`: what the plan lacks, if its defect alone takes the whole tube.
-    `bandwidth` and `demand` are of the kind that decides: what it needs of the filter, and the adaptation rate.
     `width`: of the tube in the outputs that were asked for; None: its radius counts.
     """
 
@@ -51,7 +50,6 @@ class Row(MetricRow):
     alone: bool = False
     mend: MendPlan | None = None
     width: float | None = None
-    demand: float = inf
     metric: VerifiedMetric = field(repr=False)
 
     @property
@@ -68,7 +66,7 @@ class Row(MetricRow):
 
     @property
     def idle(self) -> bool:
-        """Whether the filter that it needs is slower than its own contraction: what is gained beyond is not needed."""
+        """Whether the filter that it needs is slower than its own contraction: faster ones gain by their feedback."""
         return self.bandwidth is not None and self.bandwidth < self.rate
 
     @property
@@ -78,15 +76,14 @@ class Row(MetricRow):
 
     def score(self, objective: str) -> tuple[float, ...]:
         """Smaller is better; what is certified comes first."""
-        rank = 0 if self.counts else 1
+        rank, without = (0, self.rho or inf) if self.counts else (1, inf)
+        demand = without if self.demand is None else self.demand
         if objective == "tube":
             size = self.rho if self.width is None else self.width
             # a slower metric has to be worth it
             narrow = inf if size is None else log(size) // _NARROWER
-            return (rank, narrow, self.demand, self.condition_number)
-        if self.idle:
-            return (rank, 1, float(self.rate), self.condition_number)
-        return (rank, 0, self.demand, self.condition_number)
+            return (rank, narrow, demand, self.condition_number)
+        return (rank, demand, self.condition_number)
 
     def data(self) -> MetricRow:
         """As certificates and reports hold it."""

@@ -17,7 +17,7 @@ STYLES = {"no_adaptation": "zero", "conditions_26": "a", "distance": "b"}
 _DRAWN: Final = {
     "condition_number": "condition number",
     "input_gain": "beta / sqrt(a)",
-    "adaptation_rate": "least Γ (B)",
+    "demand": "Γ |B|²",
 }
 _FOUND: Final = "Points of a curve were found to serve: computed, not examined by recheck."
 _FLOORS: Final = {"identity": ("m1", "least condition number"), "input": ("m2", "least input gain")}

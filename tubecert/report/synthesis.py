@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 FLOORS = {"identity": "kappa", "input": "input gain"}
 _SHOWN = 12  # attempts
 _COLUMNS = (
-    "rate in 1/s, omega in rad/s, kappa: condition number; omega and Gamma are those of certificate B. beta/sqrt(a): "
+    "rate in 1/s, omega in rad/s, kappa: condition number; omega and Gamma are those of the certificate that decides, "
+    "else of B. Gamma |B|^2, in 1/s^2, compares metrics, since Gamma is of the coordinates of each tube. beta/sqrt(a): "
     "how strongly the metric lets inputs act over the tube (tubecert explain 'beta/sqrt(a)')."
 )
 _HARDLY = 1.05  # times as much
@@ -33,13 +34,13 @@ _CUT: Final = {  # why a search was ended before its end, and what that means fo
     "plan that has to be mended",
 }
 _CAUSES = {
-    "distance": "{more}: the distance that the uncertainty drives the state grows as 1/rate",
-    "gains": "no gains suffice: the distance that the uncertainty drives the state leaves no room in the tube",
+    "distance": "{more}: the distance beta/sqrt(a)/rate, by which |h| = 1 may drive the state, is more of the tube",
+    "gains": "nothing is certified",
     "overshoot": "the tube does not fit into the safe set: the overshoot sqrt(A/a) of the initial error is too large",
     "no_metric": "no metric was found",
-    "idle": "the filter would be slower than the contraction: more feedback, and nothing that adaptation needs",
-    "input_gain": "{more}: the input gain beta/sqrt(a) grows",
-    "tube": "{more}: the tube grows, and the constants over it",
+    "idle": "the filter is slower than the contraction already, and no faster rate was tried",
+    "input_gain": "{more}: the input gain beta/sqrt(a) is more of the tube",
+    "tube": "{more}: it is not beta/sqrt(a) that grows, but other constants over the tube",
 }
 
 
@@ -96,9 +97,9 @@ def _limits(limits: RateLimits) -> Iterator[str]:
     for side, limit in (("slower", limits.slower), ("faster", limits.faster)):
         if limit is None:
             continue
-        more = "more gain" if limit.factor is None else f"{short(limit.factor, 2)} times the gain"
-        if limit.factor is not None and limit.factor < _HARDLY:
-            more = "hardly more gain"
+        hardly = limit.factor is not None and limit.factor < _HARDLY
+        often = "more of" if limit.factor is None else f"{short(limit.factor, 2)} times"
+        more = f"{'hardly more of' if hardly else often} Gamma |B|^2"
         yield f"{side}: at {exact(limit.rate)} 1/s {_CAUSES[limit.cause].format(more=more)}"
 
 
@@ -107,7 +108,7 @@ def _compared(found: Sequence[MetricRow], file: MetricFile | None) -> Table:
     best = None if file is None else (file.rate, up(file.condition_number.above))
     chosen = [row for row in found if (row.rate, up(row.condition_number)) == best]
     found = [*chosen, *(row for row in found if row not in chosen)]
-    heads = ["least", ">kappa", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma (B)", "!verdict"]
+    heads = ["least", ">kappa", ">beta/sqrt(a)", ">rho", ">omega", ">Gamma", ">Gamma |B|^2", "!verdict"]
     degrees = len({row.degree for row in found}) > 1  # else all rows of a rate differ by what is least
     rows = (
         (
@@ -115,7 +116,7 @@ def _compared(found: Sequence[MetricRow], file: MetricFile | None) -> Table:
             *([str(row.degree)] if degrees else []),
             f"{FLOORS[row.floor]}{', chosen' if row in chosen else ''}",
             up(row.condition_number),
-            *map(up, (row.input_gain, row.rho, row.bandwidth, row.adaptation_rate)),
+            *map(up, (row.input_gain, row.rho, row.bandwidth, row.adaptation_rate, row.demand)),
             row.verdict or "",
         )
         for row in found
