@@ -103,7 +103,7 @@ def _limits(limits: RateLimits) -> Iterator[str]:
         yield f"{side}: at {exact(limit.rate)} 1/s {_CAUSES[limit.cause].format(more=more)}"
 
 
-def _compared(found: Sequence[MetricRow], file: MetricFile | None) -> Table:
+def _compared(found: Sequence[MetricRow], file: MetricFile | None = None) -> Table:
     """A metric a row: first, where no screen cuts it off, the one that was chosen."""
     best = None if file is None else (file.rate, up(file.condition_number.above))
     chosen = [row for row in found if (row.rate, up(row.condition_number)) == best]
