@@ -150,7 +150,7 @@ def test_nothing_is_shown_of_a_file_that_is_no_plan(name, format_):
 def test_a_plan_with_a_wrong_column_or_number_is_shown():
     Path("plan.csv").write_text("t,q,ww,u\n0,0,0,0\n")
     Path("spec.yaml").write_text(PLAN.replace("FILE", "plan.csv"))
-    assert "did you mean w?" in run("check", "spec.yaml").output
+    assert "columns: {w: ww}" in run("check", "spec.yaml").output
     Path("plan.csv").write_text("t,q,w,u\n0,zero,0,0\n1,0,0,0\n")
     done = run("check", "spec.yaml")
     assert "plan.csv:2:3: error TC108: unknown symbol zero" in done.output
@@ -194,12 +194,12 @@ def test_findings_of_a_file_are_counted_beyond_the_first():
     assert "more" in results[-1]["message"]["text"]
 
 
-def test_columns_of_a_plan_are_counted_beyond_the_first():
+def test_columns_that_a_plan_does_not_know_are_one_finding_of_a_line_or_two():
     Path("plan.csv").write_text("t,q,w,u," + ",".join(f"x{k}" for k in range(150)) + "\n")
     with pytest.raises(TubecertError) as caught:
         spec.load_text(PLAN.replace("FILE", "plan.csv"), "spec.yaml")
-    assert len(caught.value.findings) == 21
-    assert caught.value.findings[-1].message == "and 130 more"
+    (found,) = caught.value.findings
+    assert len(found.message) < 200
 
 
 def test_what_is_left_out_keeps_its_severity():

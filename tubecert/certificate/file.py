@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from tubecert.certificate.notes import split
-from tubecert.errors import TargetError
+from tubecert.errors import TargetError, TubecertError
 from tubecert.files import STDIN, Kind, read, read_stdin, replace
 from tubecert.findings import Finding
 from tubecert.printable import printable_json, visible
@@ -26,7 +26,17 @@ KIND: Final = Kind(
     most=64_000_000, unreadable="TC600", too_large="TC600", help="give a file that tubecert certify wrote"
 )
 STDOUT = "-"
-REMEDY = "choose another file with -o FILE, or -o - for stdout"
+OTHER: Final = "choose another file"
+_WITH: Final = f"{OTHER} with -o FILE"
+REMEDY = f"{_WITH}, or -o - for stdout"
+
+# of what is written: how its text begins, else the keys that it has as JSON
+_BEGINS: Final = {"html": "<!DOCTYPE html>", "markdown": "#", "csv": "quantity,"}
+_KEYS: Final = {
+    "certificate": {"format", "hash", "result"},
+    "metric file": {"format", "solver", "verified_on"},
+    "json": {"certificates", "quantities", "differences"},
+}
 
 _VERSIONED = re.compile(r"tubecert-(certificate|sampled-loop)/\d{1,9}", re.ASCII)
 
@@ -139,6 +149,40 @@ def incomplete(name: str, why: str) -> TargetError:
     """The error for a certificate that lacks something, or has it of another kind, below a hash that is right."""
     message = f"the certificate {visible(name)} is not complete: {why}"
     return TargetError([Finding(code="TC603", message=message, help="certify again")])
+
+
+def refused(message: str, help: str = _WITH) -> TargetError:
+    """The error about a file that is not written."""
+    return TargetError([Finding(code="TC120", message=message, help=help)])
+
+
+def spare(
+    target: str, what: str = "", inputs: Mapping[str, str | Path | None] = {}, help: str = _WITH
+) -> None:
+    """Raise `TargetError` for a target that would take the place of an input, or of what is no `what` of tubecert.
+
+    `inputs` are named by what they are. An older file of the same form is replaced.
+    """
+    if target == STDOUT:
+        return
+    for name, source in inputs.items():
+        same = source and os.path.abspath(source) == os.path.abspath(target)
+        if source and (same or same_file(target, source)):
+            raise refused(f"{visible(target)} is the {name} itself and would be overwritten", help)
+    if what and Path(target).is_file() and not _written_as(what, target):
+        raise refused(f"{visible(target)} is no {what} that tubecert wrote, and would be overwritten", help)
+
+
+def _written_as(what: str, path: str) -> bool:
+    """Whether tubecert writes files like this one, which may be empty, as a `what`."""
+    try:
+        text = read(path, KIND).decode().lstrip()
+        if what in _BEGINS or not text:
+            return not text or text.startswith(_BEGINS[what])
+        content = json.loads(text)
+    except (TubecertError, ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and _KEYS[what] <= content.keys()
 
 
 def check_target(target: str, remedy: str = REMEDY) -> None:

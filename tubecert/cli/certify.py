@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tubecert import certificate
 from tubecert.asking import SETTINGS, SPEC, Text, words_of
+from tubecert.certificate.file import spare
 from tubecert.cli import keeper, telling
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.report import check_pages
@@ -18,7 +19,6 @@ from tubecert.errors import ExitCode
 from tubecert.files import stem_of
 from tubecert.library import certifying
 from tubecert.library.pages import Report
-from tubecert.library.shown import spare
 from tubecert.library.specification import Specification
 from tubecert.spec import Setting, Spec, load
 from tubecert.verdict import Verdict

@@ -8,11 +8,11 @@ from typing import Final
 
 from tubecert import certificate
 from tubecert.asking import CERTIFICATE, Choice, Text, refuse
+from tubecert.certificate.file import refused, spare
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.cli.telling import present
 from tubecert.files import STDIN
-from tubecert.library.shown import refused, spare
 
 _FILES = "A page or a table: FILE.html (with figures), FILE.md, FILE.csv or FILE.json; may be repeated."
 _WORDS: Final = {

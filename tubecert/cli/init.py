@@ -9,10 +9,10 @@ from typing import Final
 
 from tubecert import certificate
 from tubecert.asking import Choice, Flag, Text, refuse
+from tubecert.certificate.file import refused
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.errors import TargetError
-from tubecert.library.shown import refused
 from tubecert.printable import visible
 
 _BESIDE: Final = {"csv": ("plan.csv",)}  # files that a template needs beside it

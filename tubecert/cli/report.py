@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from tubecert.asking import CERTIFICATE, Text, words_of
-from tubecert.certificate.file import check_target
+from tubecert.certificate.file import check_target, refused, spare
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.files import STDIN, stem_of
 from tubecert.library import pages
 from tubecert.library.reading import read
-from tubecert.library.shown import refused, spare
 from tubecert.printable import printable_json, visible
 
 _FILES: Final = "The page: FILE.html or FILE.md; may be repeated.  [CERT's stem.html]"

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tubecert import certificate
 from tubecert.asking import SETTINGS, SPEC, Text, words_of
+from tubecert.certificate.file import refused, spare
 from tubecert.cli import keeper, telling
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.telling import text_of
 from tubecert.errors import ExitCode
 from tubecert.library import metrics
-from tubecert.library.shown import refused, spare
 from tubecert.library.specification import Specification
 from tubecert.printable import visible
 from tubecert.report.terminal import Terminal

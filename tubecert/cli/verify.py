@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tubecert import certificate
 from tubecert.asking import ENDING, SETTINGS, Flag, Text, words_of
+from tubecert.certificate.file import refused, spare
 from tubecert.cli import telling
 from tubecert.cli.adapter import Output, command
 from tubecert.cli.guard import write_stdout
 from tubecert.errors import ExitCode, SpecError, TubecertError
 from tubecert.findings import Finding, Location
 from tubecert.library import metrics
-from tubecert.library.shown import refused, spare
 from tubecert.library.specification import Specification
 from tubecert.printable import visible
 from tubecert.progress import Phase

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from tubecert import asking, certificate
 from tubecert.asking import Number
+from tubecert.certificate import file
 from tubecert.errors import ExitCode, SpecError
 from tubecert.findings import Finding, Location
 from tubecert.library.certifying import BUDGET, DEADLINE
 from tubecert.library.plain import Data, document_text
-from tubecert.library.shown import Shown, spare
+from tubecert.library.shown import Shown
 from tubecert.library.specification import File, Specifiable, require_once, settings_in, spec_of
 from tubecert.progress import Progress
 from tubecert.records import to_json
@@ -86,8 +87,8 @@ class _Metric(Shown):
         Raises `TubecertError` if nothing is proven, `TargetError`.
         """
         target, text = asking.text_of("path", path), self.text()
-        spare(target, "metric file")
-        certificate.write_text(target, text, "choose another file")
+        file.spare(target, "metric file", help=file.OTHER)
+        file.write_text(target, text, file.OTHER)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 from tubecert import files
 from tubecert.asking import Text, question, text_of
-from tubecert.certificate.file import write_bytes
+from tubecert.certificate.file import refused, write_bytes
 from tubecert.errors import TargetError
 from tubecert.findings import Finding
 from tubecert.library.reading import certificate_of
-from tubecert.library.shown import Paged, refused
+from tubecert.library.shown import Paged
 from tubecert.library.specification import File
 from tubecert.report.page import Page
 from tubecert.report.page_simulation import TITLES, Simulated

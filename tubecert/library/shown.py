@@ -1,18 +1,15 @@
-"""What shows itself: in a line, and as a card in notebooks; and what it must not be written over."""
+"""What shows itself: in a line, and as a card in notebooks."""
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
-from pathlib import Path
-from typing import ClassVar, Final, TypeVar
+from typing import ClassVar, TypeVar
 
-from tubecert.asking import asker, text_of
-from tubecert.certificate.file import KIND, STDOUT, same_file, write_text
-from tubecert.errors import ExitCode, SpecError, TargetError, TubecertError
+from tubecert.asking import text_of
+from tubecert.certificate.file import OTHER, refused, spare, write_text
+from tubecert.errors import ExitCode, SpecError
 from tubecert.expression import suggestion
-from tubecert.files import read
 from tubecert.findings import Finding
 from tubecert.printable import visible
 from tubecert.report import html, markdown
@@ -20,14 +17,6 @@ from tubecert.report.page import Page
 from tubecert.report.text import Rows, headline
 
 T = TypeVar("T")
-
-# of what is written: how its text begins, else the keys that it has as JSON
-_BEGINS: Final = {"html": "<!DOCTYPE html>", "markdown": "#", "csv": "quantity,"}
-_KEYS: Final = {
-    "certificate": {"format", "hash", "result"},
-    "metric file": {"format", "solver", "verified_on"},
-    "json": {"certificates", "quantities", "differences"},
-}
 
 
 class UnknownNameError(SpecError, KeyError):
@@ -43,45 +32,6 @@ class Known(dict[str, T]):
         help = suggestion(str(name), self, what="there are") if self else "there is none"
         message = f"there is nothing called {visible(str(name))[:60]!r}"
         raise UnknownNameError([Finding(code="TC112", message=message, help=help)])
-
-
-def refused(message: str, help: str = "choose another file with -o FILE") -> TargetError:
-    """The error about a file that is not written."""
-    return TargetError([Finding(code="TC120", message=message, help=help)])
-
-
-def spare(
-    target: str,
-    what: str = "",
-    inputs: Mapping[str, str | Path | None] = {},
-    help: str = "",
-) -> None:
-    """Raise `TargetError` for a target that would take the place of an input, or of what is no `what` of tubecert.
-
-    `inputs` are named by what they are. An older file of the same form is replaced.
-    """
-    if target == STDOUT:
-        return
-    help = help or ("choose another file with -o FILE" if asker().options else "choose another file")
-    for name, source in inputs.items():
-        if source is not None and (
-            os.path.abspath(source) == os.path.abspath(target) or same_file(target, source)
-        ):
-            raise refused(f"{visible(target)} is the {name} itself and would be overwritten", help)
-    if what and Path(target).is_file() and not _written_as(what, target):
-        raise refused(f"{visible(target)} is no {what} that tubecert wrote, and would be overwritten", help)
-
-
-def _written_as(what: str, path: str) -> bool:
-    """Whether tubecert writes files like this one, which may be empty, as a `what`."""
-    try:
-        text = read(path, KIND).decode().lstrip()
-        if what in _BEGINS or not text:
-            return not text or text.startswith(_BEGINS[what])
-        content = json.loads(text)
-    except (TubecertError, ValueError, RecursionError):
-        return False
-    return isinstance(content, dict) and _KEYS[what] <= content.keys()
 
 
 class Shown:
@@ -146,7 +96,7 @@ class Paged(Shown):
         """Write it, by the ending of the name. Raises `TargetError`."""
         target = text_of("path", path)
         form = self.form_of(target)
-        spare(target, form)
+        spare(target, form, help=OTHER)
         write_text(target, getattr(self, form), self.remedy)
 
     @classmethod

@@ -16,7 +16,7 @@ from tubecert.certificate.effective import Effective
 from tubecert.enclosure.interval import Array
 from tubecert.errors import SpecError
 from tubecert.findings import Finding
-from tubecert.library.shown import Shown, spare
+from tubecert.library.shown import Shown
 from tubecert.library.specification import File, Specification
 from tubecert.report.figures_axes import Chart
 from tubecert.report.figures_file import paint
@@ -109,8 +109,8 @@ class Stated(Shown, Generic[C]):
         What is there, and no certificate, is not overwritten.
         """
         target = text_of("path", path)
-        spare(target, "certificate")
-        file.write_text(target, self.text, "choose another file")
+        file.spare(target, "certificate", help=file.OTHER)
+        file.write_text(target, self.text, file.OTHER)
 
     def plot_tube(self, ax: Axes | None = None, *, states: tuple[str, str] | None = None) -> Axes:
         """Draw plan, tube, safe set and obstacles in the plane of two states (the first two); returns the axes.
