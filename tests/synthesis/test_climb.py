@@ -207,14 +207,16 @@ def test_a_higher_degree_has_to_be_worth_a_longer_metric():
         assert climb.best.degree == degree
 
 
-@pytest.mark.parametrize(("share", "floor"), [(0.9, "identity"), (0.7, "input")])
-def test_a_metric_that_is_less_round_has_to_be_worth_it(share, floor):
-    """A condition number of 29470 took the place of one of 26 for an eighth of what they were compared by."""
+@pytest.mark.parametrize(("bandwidth", "floor"), [(0.9, "identity"), (1.1, "input")])
+def test_a_metric_of_least_input_gain_is_passed_over_if_its_filter_is_idle(bandwidth, floor):
+    """Of the tutorial's arm it would take the place of one whose tube is ten times narrower in w."""
 
     class Both(Valley):
         def __call__(self, rate, floor, full):
             row = super().__call__(rate, "identity", full)
-            return row and (replace(row, floor=floor, demand=share * row.demand) if floor == "input" else row)
+            if row is None or floor == "identity":
+                return row
+            return replace(row, floor=floor, demand=row.demand / 2, bandwidth=bandwidth * float(rate))
 
     climb = Climb(Both(0, 1e9, reach=5), "adaptation")
     climb.run(Fraction(1))

@@ -32,7 +32,7 @@ _NO_LESS = 0.75  # unless the second misses by less than this share of the first
 _BEYOND = 8.0  # and by no more than this many tubes
 _ROUNDS = 2  # of refinement: factors of sqrt(2), then of its root
 _BELOW = 4  # the climb starts so far below the slowest mode
-_WORTH = 1.2  # times as much a simpler metric may ask for: what they are compared by is known to a fifth
+_LONGER = 1.1  # times the gain is what a metric of a lower degree may ask for
 _ROUNDER = 0.95  # of the condition number
 _UP = 1 + 1e-9  # so that rounding down starts from what the last digits of a mode do not change
 _UNUSUAL = 64  # such a slow scale, or its inverse, is one of another unit of time
@@ -156,10 +156,15 @@ class Climb:
         return row
 
     def _better(self, row: Row, known: Row) -> bool:
-        """Whether a metric takes the place of another; one of a higher degree, or less round, has to be worth it."""
-        harder = row.degree > known.degree or (row.floor, known.floor) == ("input", "identity")
-        if harder and row.demand is not None:
-            row = replace(row, demand=_WORTH * row.demand)
+        """Whether a metric takes the place of another; one of a higher degree is longer, and has to be worth it.
+
+        Where one of least input gain leaves the filter idle it is the feedback that does its work, in a tube that is
+        many times wider in the states that no half-width is asked of.
+        """
+        if row.floor == "input" and row.idle and known.counts and self.objective != "tube":
+            return False
+        if row.demand is not None and row.degree > known.degree:
+            row = replace(row, demand=_LONGER * row.demand)
         return self._score(row) < self._score(known)
 
     def _around(self, best: Fraction) -> list[Fraction]:
