@@ -15,7 +15,7 @@ from texts import CONFIGS
 from tubecert import pipeline
 from tubecert.certificate.result import MetricRow
 from tubecert.claims.advice import ConstantInputs, MeasureTube
-from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable
+from tubecert.claims.failures import NoneCertified, NothingFound, NotWritable, Proven
 from tubecert.claims.statements import TubeInSafeSet
 from tubecert.enclosure.constant import Constant
 from tubecert.expression import scan
@@ -431,3 +431,11 @@ def test_the_metric_that_was_chosen_leads_the_table():
         ["1", "kappa"],
         ["2", "kappa"],
     ]
+
+
+def test_an_attempt_that_is_proven_and_does_not_serve_is_told_so():
+    """`no metric was found: 1 attempts by cegis, degree 0; the last: proven`."""
+    failure = NothingFound(attempts=1, routes=("cegis",), degrees=(0,), last=Proven())
+    assert failure._why(None) == (
+        "no metric that serves was found: 1 attempt by cegis, degree 0; the last: proven"
+    )
