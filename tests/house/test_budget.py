@@ -11,39 +11,39 @@ PACKAGE = Path(tubecert.__file__).parent
 TESTS = Path(__file__).parents[1]
 OWN = "."  # the modules beside the rooms
 BUDGET = {  # room: lines, modules, classes
-    ".": (2291, 19, 39),
+    ".": (2298, 19, 39),
     "bounds": (2273, 13, 22),
-    "certificate": (1429, 7, 42),
+    "certificate": (1519, 7, 42),
     "checking": (482, 5, 5),
-    "claims": (1120, 8, 59),
-    "cli": (2031, 17, 10),
+    "claims": (1124, 8, 59),
+    "cli": (1999, 17, 10),
     "conditions": (1510, 11, 18),
     "controller": (454, 6, 4),
     "enclosure": (2819, 14, 34),
-    "expression": (2575, 13, 15),
+    "expression": (2573, 13, 15),
     "kinds": (514, 6, 13),
-    "library": (2533, 18, 22),
-    "lint": (1206, 8, 3),
-    "loop_design": (1165, 7, 8),
+    "library": (2565, 18, 23),
+    "lint": (1222, 8, 3),
+    "loop_design": (1188, 7, 8),
     "metric": (534, 3, 4),
     "model": (515, 4, 1),
-    "pipeline": (2253, 13, 12),
+    "pipeline": (2258, 13, 12),
     "planner": (701, 4, 10),
-    "recheck": (12360, 58, 131),
-    "report": (5061, 39, 27),
-    "sampled_loop": (1516, 9, 26),
+    "recheck": (12430, 58, 131),
+    "report": (5087, 39, 27),
+    "sampled_loop": (1537, 9, 26),
     "search": (864, 7, 7),
-    "simulation": (4439, 30, 48),
+    "simulation": (4136, 26, 48),
     "spec": (4800, 24, 46),
-    "stages": (1245, 7, 12),
+    "stages": (1246, 7, 12),
     "sweep": (508, 5, 7),
     "synthesis": (3831, 16, 36),
-    "trajectory": (939, 5, 8),
+    "trajectory": (948, 5, 8),
     "tube": (563, 4, 5),
-    "words": (342, 3, 0),
+    "words": (337, 3, 0),
 }  # fmt: skip
 FUNCTIONS = 4327  # of the package
-TEST_LINES = 44_300
+TEST_LINES = 44_870
 
 
 def counted() -> dict[str, tuple[int, int, int]]:

@@ -164,9 +164,8 @@ def limits_of(limits: Field | None, hardware: Field | None) -> Field | None:
     """Where the limits of the inputs stand: in a section of their own, or in that of the hardware."""
     own = None if hardware is None else hardware.get("limits")
     if own is not None and limits is not None:
-        own.fail(
-            codes.RANGE, "hardware.limits beside limits", "they are the same limits: give one of the two"
-        )
+        help = "they are the same limits: give one of the two"
+        own.fail(codes.RANGE, "hardware.limits beside limits", help)
     return limits or own
 
 

@@ -367,9 +367,8 @@ def _continued(own: Field | None, names: Names, plan: Trajectory) -> Trajectory 
         own.fail(codes.RANGE, f"{own.path} without a horizon", help)
     elif plan.bundle is not None and afterwards in ("rest", "repeat"):
         help = "leave the horizon out: a family without one lasts for ever"
-        own.fail(
-            codes.RANGE, f"{own.path} is {afterwards}, and a family of plans has no end of its own", help
-        )
+        message = f"{own.path} is {afterwards}, and a family of plans has no end of its own"
+        own.fail(codes.RANGE, message, help)
     return replace(plan, afterwards=afterwards) if afterwards and plan.horizon else None
 
 

@@ -186,9 +186,8 @@ def _plane(field: Field | None, owner: Field, names: Names) -> tuple[str, str] |
         return _read_plane(field, names)
     if len(names.states) == 2:
         return names.states[0], names.states[1]
-    return owner.fail(
-        codes.MISSING_KEY, "the obstacle lacks states", f"add states: [{', '.join(names.states[:2])}]"
-    )
+    help = f"add states: [{', '.join(names.states[:2])}]"
+    return owner.fail(codes.MISSING_KEY, "the obstacle lacks states", help)
 
 
 def obstacles_data(obstacles: Iterable[Obstacle], spec: Any) -> list[dict[str, Any]]:
@@ -240,7 +239,6 @@ def read_simulation(field: Field | None, plan: Trajectory | None, names: Names) 
     values = SIMULATION.values(entries, names)
     duration, horizon = values.get("duration"), plan and plan.horizon
     if duration is not None and horizon is not None and duration > horizon:
-        return entries["duration"].fail(
-            codes.RANGE, "the duration exceeds trajectory.horizon", "the plan ends there"
-        )
+        message = "the duration exceeds trajectory.horizon"
+        return entries["duration"].fail(codes.RANGE, message, "the plan ends there")
     return Simulation(**values) if SIMULATION.holds(values, entries) else None

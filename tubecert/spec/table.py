@@ -153,8 +153,7 @@ class _PlanFile:
             message = "no cell of the first line is t, a state or an input"
             commas = len(header) == 1 and re.search(r"[;\t ]", header[0].text)
             apart = "separate columns by commas, and write decimals with a point; " if commas else ""
-            help = f"{apart}{self._all()}"
-            sheet.fail(Cell(line=header[0].line), codes.PLAN_COLUMNS, message, help)
+            sheet.fail(Cell(line=header[0].line), codes.PLAN_COLUMNS, message, f"{apart}{self._all()}")
             return False
         # of columns with names that a stranger chose nothing is shown before a row of numbers
         sheet.shown = not self.others and all(_NAME.fullmatch(cell.text) for cell in header)
