@@ -52,7 +52,7 @@ class InputBound:
 class LimitedInput:
     """An input with limits; `least` and `greatest` enclose inf u* and sup u* on the plan, in printable numbers.
 
-    `any_plan`: they are those of a family, whose members need not reach them.
+    `any_plan`: they are those of a family, or of a planner: a plan need not reach them.
     """
 
     name: str

@@ -135,7 +135,7 @@ class _Quotient:
 
 
 def vanish(terms: Sequence[Term]) -> bool:
-    """Whether every term is proven to be zero wherever it is defined."""
+    """Whether every term is proven to be zero wherever all of them are defined (a root may be told by another term)."""
     terms = by_addition(_exponentials(terms))
     order = in_order(terms)
     waves = [term for term in order if term.op in ("sin", "cos", "tan")]

@@ -205,14 +205,17 @@ def _tube_leaves(told: _Told) -> Outcome:
     return _leaves(told, result.tube.rho, least)
 
 
+_OF_NO_PLAN = Outcome(verdict="undecided", why="the question is about no plan that is known")
+
+
 def _leaves(told: _Told, radius: Fraction, least: Fraction) -> Outcome:
     """The plan, with `least` around it, is beyond the face that is told; the witness is `radius` beyond the plan."""
     s, family = told.case.system, told.case.result.specification.trajectory
     name, above = told.word("state", *s.states), told.word("side", "lower", "upper") == "upper"
     i, (low, high), t = s.states.index(name), s.safe_set[name], told.moment
     sign, limit = (1, high) if above else (-1, -low)
-    if isinstance(family, AnyPlan):
-        return Outcome(verdict="undecided", why="whether a plan of the family is there is not known")
+    if isinstance(family, AnyPlan | Planned):
+        return _OF_NO_PLAN
     x, _ = told.case.curve.at(t)
     beyond = sign * x[i] - exact(limit)
     if not beyond + exact(least) > 0:
@@ -231,6 +234,8 @@ def _starts_outside(told: _Told) -> Outcome:
     if s.within is not None:
         told.close("off", off, exact(s.within))
         return _if(s.within > asked[name] and not told.x and not told.t)
+    if isinstance(told.case.result.specification.trajectory, Planned):
+        return _OF_NO_PLAN
     i = s.states.index(name)
     for point in start.points(s):
         apart = abs(Program([start.off_plan(point, told.case.curve)[i]], ()).run(())[0])
@@ -248,8 +253,8 @@ def _shown(point: Sequence[Fraction]) -> Numbers:
 def _plan_exceeds(told: _Told) -> Outcome:
     """u* of the plan is beyond a limit at the time of the witness; of a family nothing of the kind is known."""
     spec, inputs = told.case.result.specification, told.case.system.inputs
-    if isinstance(spec.trajectory, AnyPlan):
-        raise _AnotherError("it is of no known plan")
+    if isinstance(spec.trajectory, AnyPlan | Planned):
+        return _OF_NO_PLAN
     name, side = told.word("input", *spec.limits), told.word("side", "lower", "upper")
     low, high = ends = spec.limits[name]
     told.same("limit", ends[side == "upper"])

@@ -30,7 +30,6 @@ Ranges = list[tuple[float, float]]
 _LESS, _MORE = 1 - 1e-14, 1 + 1e-14
 _SLACK = 4e-14  # relative to the sum of magnitudes: sums of at most 64 terms
 _INNER = 1 - 1e-9
-_TINY = 1e-280
 _FAR = 1e80  # from 1 in either direction: within it no square, product or quotient of these leaves the range of floats
 
 
@@ -175,13 +174,11 @@ class _Form:
             for i in range(len(block))
         ]
         self._weights, self._rows = _squares(Q)
-        _square(*self._weights)
+        _square(*self._weights, *(abs(l) for row in self._rows for l in row if l))
         self._least = [math.nextafter(float(d), 0.0) for d in self._weights]
         self._floats = [[float(l) for l in row] for row in self._rows]
         n = range(len(which))
         self._others = [[[0.0 if i == j else row[i] for i in n] for j in n] for row in self._floats]
-        if any(l and abs(float(l)) < _TINY for row in self._rows for l in row):
-            raise ValueError("the tube is too narrow in one direction for floats")
         columns = [[Q[i][j] for i in n] for j in n]
         self._completion = [
             [product([row[i] for i in which], column) for column in columns] for row in spread

@@ -212,9 +212,12 @@ class Checked(NamedTuple):
 
 
 def refuted(loop: Loop) -> Checked | None:
-    """Where the plan leaves the safe set, in which its tube must lie, at a time that is looked at; None if nowhere."""
+    """Where the plan leaves the safe set, in which its tube must lie, at a time that is looked at; None if nowhere.
+
+    Of a planner's plan and of a family nothing is refuted: there may be others.
+    """
     plan = loop.plan
-    if isinstance(plan, Family):
+    if isinstance(plan, Family) or loop.spec.trajectory.task is not None:
         return None
     last = 0.0 if plan.horizon is None else fraction_bounds(plan.horizon)[0]
     knots = () if loop.knots is None else map(float, loop.knots.t)

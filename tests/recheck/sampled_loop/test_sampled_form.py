@@ -127,6 +127,12 @@ def test_a_sampled_loop_is_refuted_by_where_its_plan_is_and_by_nothing_else():
         assert lack[key] != to
         assert why_not(changed(document, "lacks", 0, key, to=to))
     assert why_not(changed(document, "lacks", to=[]))
+    planned = "{kind: ilqr, start: [0], target: [1], horizon: 2, knots: 3}"
+    other = json.loads(certificate_text(certify(load_text(text_of(trajectory=planned)))))["result"]
+    other["planned"]["x"][1] = ["9"]  # the knots are the certificate's own word
+    kept = {key: other[key] for key in ("spec", "claim", "planned")}
+    lie = {**kept, "verdict": "refuted", "lacks": [{**lack, "needed": 9.0, "allowed": 5000.0, "at": 1.0}]}
+    assert why_not(resealed({**document, "result": lie}))
     for lie in (made(SCALAR), made(FAMILY)):
         del lie["result"]["controller"]
         assert why_not(

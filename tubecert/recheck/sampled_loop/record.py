@@ -121,14 +121,14 @@ def read_result(node: Node) -> Result:
 
 
 def _outside(lacks: Node, spec: SampledSpecification) -> list[tuple[int, Fraction, Fraction, Fraction]]:
-    """Where the plan is outside of the safe set: the one thing that refutes a sampled loop, and no family's."""
+    """Where the plan is outside of the safe set: the one thing that refutes a sampled loop, if the plan is known."""
     found, states = [], list(spec.plant.states)
     for item in lacks.entries():
         own = item.closed("kind", "where", "needed", "allowed", "at")
         own["kind"].word("plan")
         place = states.index(own["where"].word(*states))
         found.append((place, own["at"].number(), own["needed"].number(), own["allowed"].number()))
-    if not found or spec.trajectory.kind == "any":
+    if not found or spec.trajectory.kind in ("any", "ilqr"):
         raise lacks.refused("does not refute it")
     return found
 
