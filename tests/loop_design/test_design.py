@@ -305,3 +305,15 @@ limits: {{u: [-1, 1]}}
     assert result.verdict == "certified"
     assert result.tube[-1].start <= 25 * rate
     assert result.tube[-1].half_widths["x"] < 0.01
+
+
+def test_a_spring_that_is_held_off_its_rest_by_a_mass_known_to_ten_per_cent():
+    """The rate of what a constant parameter does at rest is what rounding leaves of 0: no unit for a signal."""
+    text = """tubecert: 1
+name: spring
+system: {states: [x, v], inputs: [F], parameters: {m: [0.9, 1.1]}, f: [v, -10*x/m], B: [[0], [1/m]]}
+safe_set: {x: [-1, 1], v: [-3, 3]}
+trajectory: {kind: equilibrium, at: [0.1, 0], input: [1]}
+hardware: {rate: 200, noise: {x: 0.001, v: 0.01}}
+"""
+    assert certify(load_text(text)).result.verdict == "certified"

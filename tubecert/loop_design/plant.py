@@ -138,7 +138,8 @@ def in_units(plant: Plant) -> Plant:
     with np.errstate(all="ignore"):
         for _ in range(_DOUBLED):
             most = np.where(plant.rate > 0, plant.rate * horizon, np.inf)
-            a = np.where(plant.magnitude > 0, np.minimum(plant.magnitude, most), 1.0)
+            turned = np.minimum(plant.magnitude, most)
+            a = np.where(turned > 0, turned, 1.0)  # a rate may be what rounding leaves
             columns = np.hstack([plant.H * a, plant.E, plant.B])
             pushed = np.max([np.abs(flow(plant.A, columns, horizon * i / 8)[1]) for i in range(1, 9)], axis=0)
             signals, moved = np.split(pushed, [-plant.B.shape[1]], axis=1)
