@@ -18,7 +18,6 @@ from tubecert.simulation.adaptive import figures as drawing
 from tubecert.simulation.adaptive.campaign import cases
 from tubecert.simulation.adaptive.setting import Choice, loop_of, setting_of
 
-pytestmark = pytest.mark.timeout(240)  # the first run compiles
 LOCATED = re.compile(r"(^|\n)(\S+:\d+:\d+: |--[a-z-]+: )?error TC\d{3}: ")
 
 

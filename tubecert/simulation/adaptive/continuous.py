@@ -231,10 +231,8 @@ class Continuous:
     def _slope(self, stage: int, x: Array) -> Array:
         """f + B(u* + k + h) + E w (n, N) at a stage of the step; what u_a has added to x meanwhile is added here."""
         t = float(self._grid.start[self._step] + SHARES[stage] * self._grid.length[self._step])
-        plan = Reference(
-            *(part[self._step, _SIDES[stage]] for part in self._grid.plan)
-        )  # (.., 1) if that is one
-        if self._plans is not None:
+        plan = Reference(*(part[self._step, _SIDES[stage]] for part in self._grid.plan))
+        if self._plans is not None:  # else there is one for all lanes, (.., 1)
             plan = Reference(*(part[:, self._plans] for part in plan))
         if stage == 0:
             self._B.clear()
@@ -295,7 +293,7 @@ class Continuous:
         return np.asarray(np.minimum(-phi, 0.0) / (2 * np.maximum(reach, _NOTHING)) * push)
 
     def _flown(self, stage: int, x: Array) -> Array:
-        """What u_a has added to the slow state until a stage (n, N); it is V times the mean of B so far."""
+        """What u_a has added to the slow state until a stage (n, N): B of the stage before times V."""
         if stage == 1:
             self._own = self._flows_of(x, float(self._grid.length[self._step]))
         V = np.zeros((self._at.V.stop - self._at.V.start, len(self._stopped)))

@@ -13,8 +13,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.simulation.adaptive.campaign import Campaign
 from tubecert.simulation.adaptive.loops import Loop, Runs
 from tubecert.simulation.adaptive.setting import Setting
-from tubecert.simulation.figures import COLORS, TUBE, blank, images, labelled, names_of, titled
-from tubecert.simulation.figures import plane as plane_of
+from tubecert.simulation.figures import COLORS, TUBE, blank, images, labelled, names_of, plane, titled
 from tubecert.simulation.folder import npz
 
 if TYPE_CHECKING:
@@ -99,7 +98,7 @@ def _plane(campaign: Campaign) -> Figure | None:
     plan = setting.plan.enclose(t, t)[0].mid[:, [i, j]]
     section = _section(setting, i, j)
     shapes = [section + point for point in plan[:: -(-len(plan) // _SHAPES)]]
-    figure, axis = plane_of(setting.spec, names, shapes, plan)
+    figure, axis = plane(setting.spec, names, shapes, plan)
     for item in campaign.loops:
         _draw(axis, item.loop, item.runs.x[0, :, i], item.runs.x[0, :, j], zorder=4)
     for end, marker in ((0, "o"), (-1, "s")):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any, Literal, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,6 @@ from tubecert.trajectory import Plan
 
 R = TypeVar("R")
 Controller = Literal["nominal", "ccm", "reference", "l1"]
-CONTROLLERS: Final[tuple[Controller, ...]] = ("nominal", "ccm", "reference", "l1")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -240,7 +239,7 @@ def of_some(record: R, lanes: NDArray[np.intp]) -> R:
 
 
 def put(record: R, lanes: NDArray[np.intp], other: R) -> None:
-    """Takes some lanes from another."""
+    """Some lanes become those of another record, one after the other."""
     mapped(lambda whole, part: whole.__setitem__((..., lanes), part), record, other)
 
 

@@ -293,14 +293,13 @@ def promise(setting: Setting, name: Name) -> Promise | None:
         "sigma_error": sup("h") + radius,  # (2.10)
         "xtilde": _prediction_error(setting, recipe),
     }
+    decay = _decay(setting, recipe) if isinstance(recipe, DistanceRecipe) else None  # A bounds the tube only
     return Promise(
         bounds=bounds,
         half_widths=setting.half_widths,
         ranges={own.input: own.bounds[name.key] for own in setting.result.inputs if name.key in own.bounds},
         ultimate=setting.result.sections[name.key].ultimate_radius,
-        decay=_decay(setting, recipe)
-        if isinstance(recipe, DistanceRecipe)
-        else None,  # A bounds the tube only
+        decay=decay,
     )
 
 
