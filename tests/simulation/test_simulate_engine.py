@@ -143,7 +143,7 @@ def test_a_wind_moves_the_state_and_not_what_is_predicted(controller, radius):
     z0 = np.concatenate([START[0], np.zeros(SIZES[controller])])
     case = problem(controller, gains=gains, E=tuple((constant(Fraction(repr(float(e)))),) for e in E))
     expected = dop853(rate, z0, case[0].times, max_step=1e-3)
-    h = Disturbance.from_expressions(wavy_h(), TWO, 1, k=1)
+    h = Disturbance.from_expressions(wavy_h(), TWO, 1)
     blowing = {"wind": 1.0, "blowing": [1.0], "gusting": [2.0, 0.4]}
     h = h._replace(**{name: np.array([value]).T for name, value in blowing.items()})
     found = alone(case, START, h, tolerance=1e-5)
@@ -165,8 +165,8 @@ def test_a_wind_that_aims(aim):
         return f(t, z) + E @ w / np.sqrt(w @ w + (0.05 * 2.0) ** 2) * 0.5
 
     case = problem("ccm", E=tuple(tuple(constant(Fraction(repr(float(e)))) for e in row) for row in E))
-    h = Disturbance.from_expressions(wavy_h(), TWO, 1, k=2)._replace(layer=np.array([2.0]))
-    blowing = {"wind": 0.5, "aim": float(aim), "gusting": [0.0, np.pi / 2]}
+    h = Disturbance.from_expressions(wavy_h(), TWO, 1)._replace(layer=np.array([2.0]))
+    blowing = {"wind": 0.5, "aim": float(aim), "blowing": [0.0, 0.0], "gusting": [0.0, np.pi / 2]}
     h = h._replace(**{name: np.array([value]).T for name, value in blowing.items()})
     found = alone(case, START, h, tolerance=1e-5)
     assert np.abs(found.x[0] - dop853(rate, START[0], case[0].times)).max() <= found.error[0] <= 5e-5

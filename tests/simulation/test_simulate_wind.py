@@ -40,7 +40,7 @@ def test_a_run_is_that_of_the_plant_with_its_parameters():
     setting = stirred("none")
     case = replace(setting, times=np.linspace(0, 2, 5), horizon=2.0), loop("none")
     model = setting.model
-    still = Disturbance.from_expressions(None, model, 1, 1)
+    still = Disturbance.from_expressions(None, model, 1)
     theta = np.array([[0.31], [0.02]])
     moved = still._replace(theta=theta)
     x0 = np.array([[0.05, 0.0]])

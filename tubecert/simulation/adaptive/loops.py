@@ -164,15 +164,15 @@ class Disturbance(NamedTuple):
 
     @classmethod
     def from_expressions(
-        cls, base: tuple[Expression, ...] | None, model: ControlAffineModel, lanes: int, k: int = 0
+        cls, base: tuple[Expression, ...] | None, model: ControlAffineModel, lanes: int
     ) -> Disturbance:
-        """The same h, given by expressions of t and the states, on every lane; none of k winds."""
-        return cls.nothing(len(model.states), len(model.inputs), lanes, k)._replace(base=base)
+        """The same h, given by expressions of t and the states, on every lane, without wind."""
+        return cls.nothing(len(model.states), len(model.inputs), lanes)._replace(base=base)
 
     @classmethod
-    def nothing(cls, n: int, m: int, lanes: int, k: int = 0) -> Disturbance:
-        """Nothing for n states, m inputs and k winds."""
-        waves, others = ((0, m), (0,), (0, n), (0,)), ((), (), (k,), (2,), (0,))
+    def nothing(cls, n: int, m: int, lanes: int) -> Disturbance:
+        """Nothing for n states and m inputs."""
+        waves, others = ((0, m), (0,), (0, n), (0,)), ((), (), (0,), (2,), (0,))
         none = [np.zeros((*shape, lanes)) for shape in (*waves, (), (), (), *others)]
         return cls(None, *none)._replace(radius=np.full(lanes, np.inf), layer=np.full(lanes, 1e-3))
 
