@@ -37,7 +37,7 @@ _COARSER: Final = 3  # times: the steps of runs that are only compared
 _MOVED: Final = 0.3  # of the width of a gene, at first
 _FIRST: Final = 8  # of the first vector: who interrupts soon has these, and the loops that are drawn
 _KEPT: Final = ("x", "off", "distance")  # of random runs, at the output times
-PLANS: Final = 25  # random plans whose runs are one vector
+_PLANS: Final = 25  # random plans whose runs are one vector
 SPECIFIED: Final = "of the specification"
 RANDOM: Final = "of random run {run}, seed {seed}"
 _HERE: Final = Serial()
@@ -264,7 +264,7 @@ def follow(
         return [joined(runs[i :: len(tested)]) for i in range(len(tested))], [defect for _, defect in drawn]
 
     with suppress(KeyboardInterrupt):
-        vectors = vectors_of(asked * each, PLANS * each, PLANS * each)
+        vectors = vectors_of(asked * each, _PLANS * each, _PLANS * each)
         parts = finished(along, vectors, _HERE, report, "random plans of the family")
     if not parts:
         return None

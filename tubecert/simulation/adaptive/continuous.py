@@ -26,7 +26,7 @@ from tubecert.enclosure.tape import Tape
 from tubecert.expression import ZERO, Expression
 from tubecert.expression.matrix import Matrix
 from tubecert.model import TIME, ControlAffineModel
-from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, times
+from tubecert.simulation.adaptive.flows import Fast, Flow, blocks, driven
 from tubecert.simulation.adaptive.geodesics import FOUND, REASONS, Geodesic, Geodesics
 from tubecert.simulation.adaptive.loops import Found, Lanes, LoopGains, Problem, Seen, Sizes, mapped
 from tubecert.simulation.adaptive.times import END, MIDDLE, START, Grid, Reference
@@ -242,16 +242,16 @@ class Continuous:
         f, B, base, E, rest = self._acting.terms(t, x)
         geodesic = self._geodesics.connect(plan.x, x)
         self._stop(geodesic.status != FOUND, geodesic.status)
-        ahead = f + times(B, plan.u)
+        ahead = f + driven(B, plan.u)
         push = _reached(B, geodesic.end)
         k = self._feedback(plan, ahead, push, geodesic)
         h = self._acting.h(t, x, base, push)
-        slope = ahead + times(B, k + h)
+        slope = ahead + driven(B, k + h)
         first = self._at.end + stage * self._forces
         self._known[first : first + len(h)] = h
         self._B.append(B)
         if self._blown:
-            wind = rest + self._acting.wind(t, E, (geodesic.end, times(B, push)))
+            wind = rest + self._acting.wind(t, E, (geodesic.end, driven(B, push)))
             self._known[first + len(h) : first + self._forces] = wind
             slope += wind
         if stage == 0:
@@ -259,7 +259,7 @@ class Continuous:
             seen = Seen(
                 x=x,
                 off=x - plan.x,
-                slope=slope + times(B, u_a),
+                slope=slope + driven(B, u_a),
                 u=plan.u + k + u_a,
                 k=k,
                 u_a=u_a,
@@ -300,14 +300,14 @@ class Continuous:
         for (lanes, fast), flow in zip(self._fast, self._own, strict=True):
             known = self._known[: self._at.end + stage * self._forces, lanes]
             V[:, lanes] = fast.idle(flow, fast.ahead(known), whole=stage == 3)
-        return times(self._B[-1], V)
+        return driven(self._B[-1], V)
 
     def _flows_of(self, x: Array, length: float) -> list[Flow]:
         """Those of the step, for B at its middle, where x comes but for u_a."""
         level, B = self._grid.level, self._B[0]
         if B.ndim == 3:
             t, u_a = float(self._grid.start[self._step]) + length / 2, self._y[self._at.u_a]
-            B = self._acting.input(t, x + length / 2 * times(B, u_a))
+            B = self._acting.input(t, x + length / 2 * driven(B, u_a))
             return [fast.flow(B[..., lanes], length, level) for lanes, fast in self._fast]
         same = round(log(length), 10)  # lengths that differ by rounding are one
         if same not in self._flows:
@@ -322,7 +322,7 @@ class Continuous:
             z = fast.ahead(self._known[:, lanes])
             self._y[:, lanes], self._within[:, lanes] = fast.advance(flow, z)
         a, b, c, d = self._B
-        moved = times(a if a.ndim == 2 else (a + 2 * (b + c) + d) / 6, self._y[self._at.V])
+        moved = driven(a if a.ndim == 2 else (a + 2 * (b + c) + d) / 6, self._y[self._at.V])
         self._y[self._at.V] = 0.0
         if self._stopped.any():
             self._y[:, self._stopped != FOUND] = 0.0

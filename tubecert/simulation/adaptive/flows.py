@@ -170,7 +170,7 @@ class Fast:
         missing[at.sigma_hat], missing[at.u_a] = one, -dt / 2 * self.gains.bandwidth * one
         for i in range(parts):
             before, z = z[at.sigma_hat], _applied(part, z)
-            z -= times(missing, self._cut(before, z[at.sigma_hat]))
+            z -= driven(missing, self._cut(before, z[at.sigma_hat]))
             if 2 * i < 2**_WINDOW:
                 seen += [z[: at.u_a.start], z[at.end : at.end + self._m]]
         return z[: at.end], self._most(np.concatenate(seen))
@@ -199,7 +199,7 @@ class Fast:
         return np.asarray(sigma * (radius / np.maximum(size, radius)))
 
 
-def times(B: Array, u: Array) -> Array:
+def driven(B: Array, u: Array) -> Array:
     """B u (n, N) for B (n, m) or (n, m, N) and u (m, N)."""
     return np.asarray(B @ u if B.ndim == 2 else np.einsum("ijn,jn->in", B, u))
 

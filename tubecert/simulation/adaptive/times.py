@@ -43,7 +43,7 @@ class Grid(NamedTuple):
     plan: Reference
 
 
-def corners_of(knots: Knots) -> Array:
+def kinks_of(knots: Knots) -> Array:
     """Times that no step may straddle: where u* has corners, or until when it is held; (K,)."""
     values = knots.u
     if knots.interpolation == "hermite-simpson":
@@ -61,7 +61,7 @@ def corners_of(knots: Knots) -> Array:
 
 def output_times(plan: Plan, horizon: float) -> Array:
     """About `TIMES` times, or more: corners of the plan if it has as many, for steps end there anyway."""
-    kinks = np.zeros(0) if plan.knots is None else corners_of(plan.knots)
+    kinks = np.zeros(0) if plan.knots is None else kinks_of(plan.knots)
     inner = kinks[kinks < horizon * (1 - _SAME)]
     every = len(inner) // (TIMES - 1)
     return np.array([0.0, *inner[every - 1 :: every], horizon]) if every else np.linspace(0.0, horizon, TIMES)
@@ -72,7 +72,7 @@ def steps(problem: Problem, level: int, plans: Sequence[Plan], count: int | None
 
     With a `count` so many equal ones, which pass over the corners of plans, and no output times but the ends.
     """
-    end, kinks = problem.horizon, [corners_of(plan.knots) for plan in plans if plan.knots]
+    end, kinks = problem.horizon, [kinks_of(plan.knots) for plan in plans if plan.knots]
     inner = [] if count else [problem.times, *(own[own < end] for own in kinks)]
     t = np.unique(np.minimum(np.concatenate([[0.0, end], *inner]), end))  # ends of steps
     t = t[np.append(True, np.diff(t) > _SAME * end)]
