@@ -43,9 +43,9 @@ def prepared(folder: str) -> Iterator[None]:
 
 
 def written_to(
-    folder: str, summary: object, files: Iterable[tuple[str, bytes]], outdated: Sequence[str] = ()
+    folder: str, summary: object, files: Iterable[tuple[str, bytes]], outdated: Sequence[str]
 ) -> list[str]:
-    """Writes files, then the summary. Their names; raises `TargetError`.
+    """Writes files, then the summary, in place of `outdated` ones. Their names; raises `TargetError`.
 
     Who interrupts has the files so far and the summary: the runs are over, and to draw takes seconds.
     """
