@@ -45,9 +45,8 @@ from tubecert.recheck.terms import (
     unit_matrix,
 )
 
-_ROUGH = Fraction(
-    1, 1000
-)  # to which modes are known, of 1 + their size: repeated ones are known to few digits
+# to which modes are known, of 1 + their size: repeated ones are known to few digits
+_ROUGH = Fraction(1, 1000)
 _CLOSE = Fraction(1, 10**6)  # of a number, and of a thousandth of its scale: three digits of it are told
 
 
@@ -210,13 +209,13 @@ _OF_NO_PLAN = Outcome(verdict="undecided", why="the question is about no plan th
 
 def _leaves(told: _Told, radius: Fraction, least: Fraction) -> Outcome:
     """The plan, with `least` around it, is beyond the face that is told; the witness is `radius` beyond the plan."""
-    s, family = told.case.system, told.case.result.specification.trajectory
-    name, above = told.word("state", *s.states), told.word("side", "lower", "upper") == "upper"
-    i, (low, high), t = s.states.index(name), s.safe_set[name], told.moment
-    sign, limit = (1, high) if above else (-1, -low)
-    if isinstance(family, AnyPlan | Planned):
+    if isinstance(told.case.result.specification.trajectory, AnyPlan | Planned):
         return _OF_NO_PLAN
-    x, _ = told.case.curve.at(t)
+    s = told.case.system
+    name, above = told.word("state", *s.states), told.word("side", "lower", "upper") == "upper"
+    i, (low, high) = s.states.index(name), s.safe_set[name]
+    sign, limit = (1, high) if above else (-1, -low)
+    x, _ = told.case.curve.at(told.moment)
     beyond = sign * x[i] - exact(limit)
     if not beyond + exact(least) > 0:
         return _if(False)
