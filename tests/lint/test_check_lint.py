@@ -333,8 +333,7 @@ def test_at_auto_is_the_equilibrium_near_a_point_in_exact_numbers():
     assert abs(Fraction(middle["trajectory"]["at"][0]) - 3) < Fraction("0.3")
     near_by = ("at: [0, 0], input", "at: auto, near: [0.1, 0], input")
     held = load_text(changed(("-k*p - v", "19.62*sin(p)"), near_by, (START, ""))).trajectory
-    # by its input: no state moves
-    assert [term.expression.fraction for term in held.x] == [Fraction(1, 10), 0]
+    assert [term.expression.fraction for term in held.x] == [Fraction(1, 10), 0], "its input holds it"
     assert abs(float(held.u[0].expression.fraction) + 19.62 * math.sin(0.1)) < 1e-15
 
 

@@ -203,16 +203,7 @@ RUN = HEAD + ', "run": {}, "hash": "x", "result": {"verdict": '
 NINES = '{"x": ' + "9" * 10_000 + "}"
 HIDDEN = '{"x": "' + r"\"" + "]" * 10**5 + '", "y": ' + "[" * 10**5 + "]" * 10**5 + "}"
 NO_CERTIFICATES = {
-    "TC600": [
-        "",
-        "{",
-        HEAD + ', "format": "x"}',
-        '{"format": NaN}',
-        '{"x": 1e999}',
-        "[" * 10**5,
-        HIDDEN,
-        NINES,
-    ],
+    "TC600": ["", "{", HEAD + ', "format": "x"}', '{"x": NaN}', '{"x": 1e999}', "[" * 10**5, HIDDEN, NINES],
     "TC601": ["{}", "[]", '"tubecert-certificate/3"'],
     "TC602": [f'{{"format": "tubecert-certificate/{k}"}}' for k in ("1", "4", "9" * 24)],
     "TC603": [HEAD + "}", RUN + '"maybe"}}', RUN + '"certified"}}'],

@@ -69,8 +69,8 @@ def test_wide_products_and_quotients_reach_from_end_to_end(a, b):
         assert float(found.upper() - found.lower()) < float(max(values) - min(values)) * (1 + 1e-6)
 
 
-@pytest.mark.parametrize("name", _WIDE)
-def test_what_is_not_a_number_stays_so_in_wide_products(name):
+def test_what_is_not_a_number_stays_so_in_wide_products_and_powers():
+    assert not _WIDE["pow"]([NOTHING], 2).is_finite()
     for other in (arb(1), arb(1, 0.5), arb("0 +/- inf")):
-        for args in ([NOTHING, other], [other, NOTHING][: 1 if name == "pow" else 2]):
-            assert not _WIDE[name](args, 2).is_finite() or (name == "pow" and not args[0].is_nan())
+        for args in ([NOTHING, other], [other, NOTHING]):
+            assert not _WIDE["mul"](args, 0).is_finite()

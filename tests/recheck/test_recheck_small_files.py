@@ -69,24 +69,24 @@ _RISING = "((sin(x)*sin(y)*sin(z)*sin(x*y))**12)**12*cos(x)*cos(y)*cos(z)*cos(x*
 
 
 @pytest.mark.parametrize(
-    "text", [f"((1 + {_PARTS})**12)**12", _RISING, "(x**12)**12*sqrt(1 + x + y + z + x*y)"]
+    ("text", "long"),
+    [(f"((1 + {_PARTS})**12)**12", True), (_RISING, True), ("(x**12)**12*sqrt(1 + x + y + z + x*y)", False)],
 )
-def test_powers_that_are_too_long_are_not_multiplied_out(text):
+def test_powers_that_are_too_long_are_not_multiplied_out(text, long):
     one = terms([text], "xyz")
     assert not vanish(one)
-    assert text.endswith("y)") or expanded(one) is None
+    assert (expanded(one) is None) is long
 
 
 def test_what_does_not_divide_a_power_is_not_divided_to_the_end():
     (one,) = terms(["1/(1 + x + y + z + x*y + x*z)*(((x*y*z)**12)**12)"], "xyz")
-    assert cancelled([one])
+    found, own = Program([*cancelled([one]), one], "xyz").run([exact(3), exact(1), exact(2)])
+    assert found.overlaps(own)
+    assert found.is_finite()
 
 
 def test_a_root_of_a_quotient_is_known_by_its_square():
     ratio = "(x + y + sin(z))/(1 + x**2 + y)"
-    assert vanish(
-        terms(
-            [f"sqrt({ratio})**2 - {ratio}", f"sqrt({ratio}) - sqrt(1/(1 + x*x + y)*(y + x + sin(z)))"], "xyz"
-        )
-    )
+    other = "1/(1 + x*x + y)*(y + x + sin(z))"
+    assert vanish(terms([f"sqrt({ratio})**2 - {ratio}", f"sqrt({ratio}) - sqrt({other})"], "xyz"))
     assert not vanish(terms([f"sqrt({ratio}) - sqrt((x + y)/(1 + x**2 + y))"], "xyz"))
