@@ -116,14 +116,8 @@ def test_a_sampled_loop_is_refuted_by_where_its_plan_is_and_by_nothing_else():
     )
     assert (document["result"]["verdict"], why_not(document)) == ("refuted", [])
     (lack,) = document["result"]["lacks"]
-    for key, to in (
-        ("where", "u"),
-        ("needed", 8.9),
-        ("allowed", 6.0),
-        ("at", 0.1),
-        ("at", 2.1),
-        ("kind", "start"),
-    ):
+    lies = [("where", "u"), ("needed", 8.9), ("allowed", 6.0), ("at", 0.1), ("at", 2.1), ("kind", "start")]
+    for key, to in lies:
         assert lack[key] != to
         assert why_not(changed(document, "lacks", 0, key, to=to))
     assert why_not(changed(document, "lacks", to=[]))

@@ -163,9 +163,8 @@ class Case:
         found = serves(task, self._proven.plan) if isinstance(task, Planned) else CONFIRMED
         why = "it is not over, or not where it began, when it begins again"
         met = horizon is None or last * self._spec.hardware.sample_time < horizon
-        return together(
-            [found, stated(self.course.goes_on, why), stated(met, "a stage begins after its end")]
-        )
+        begins = stated(met, "a stage begins after its end")
+        return together([found, stated(self.course.goes_on, why), begins])
 
     def smooth(self) -> Outcome:
         """What everything owes is kept on the safe set, and along the plan."""
