@@ -1,6 +1,6 @@
 """Values of expressions as balls (Arb, `BITS` bits): enclosures, but of tables, which are read at a middle.
 
-And where expressions vanish, by Newton's method in the middles: a proposal.
+Where expressions vanish is found by Newton's method in the middles: a proposal.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ if TYPE_CHECKING:
     from flint import arb
 
 BITS: Final = 300
-_LEFT: Final = Fraction(1, 10**40)  # of the largest slope: what a root may leave
-_DAMPED: Final = Fraction(
-    1, 10**20
-)  # of the same, squared: rows that depend on each other have a least step, too
+_LEFT: Final = Fraction(1, 10**40)  # of the largest slope: what may be left of a function at a root of it
+# of the same, squared: rows that depend on each other have a least step, too
+_DAMPED: Final = Fraction(1, 10**20)
 
 
 def ball(q: Fraction) -> arb:
@@ -72,7 +71,7 @@ def _value(node: Expression, args: Sequence[arb], point: Mapping[str, arb]) -> a
 
 
 def towards_root(
-    roots: Sequence[Expression],
+    functions: Sequence[Expression],
     names: Sequence[str],
     start: Sequence[Fraction],
     size: Sequence[Fraction],
@@ -80,15 +79,15 @@ def towards_root(
     first: int,
     steps: int,
 ) -> tuple[list[Fraction], bool]:
-    """Where Newton's steps lead, and whether `roots` (n) vanish there but for 40 digits.
+    """Where Newton's steps lead, and whether the n `functions` vanish there, but for 1e-40 of their largest slope.
 
-    The variables from `first` on move, by equal shares of their `size`; where the roots cannot vanish, to where they
-    are least.
+    The variables from `first` on move, by equal shares of their `size`; where the functions cannot vanish, to where
+    they are least.
     """
     from flint import arb_mat, ctx
 
-    every, n = range(len(names)), len(roots)
-    entries = [*roots, *(slope for row in jacobian(roots, names) for slope in row)]
+    every, n = range(len(names)), len(functions)
+    entries = [*functions, *(slope for row in jacobian(functions, names) for slope in row)]
     with ctx.workprec(BITS):
         z, scale = list(map(ball, start)), list(map(ball, size))
         for _ in range(steps):

@@ -100,7 +100,7 @@ def _box(
 
 
 def _start(field: Field, plan: Trajectory, names: Names, given: Collection[str]) -> Vector | None:
-    """x*(0), which must be rational; 0 in its place where it is not, of states whose start is `given`."""
+    """x*(0), which must be rational; where it is not, 0 stands in for a state whose start is `given` anyhow."""
     if plan.table is not None:
         return plan.table.knots.x[0]
     if plan.bundle is not None:

@@ -385,7 +385,6 @@ def equilibrium(plant: Plant, x: Vector, u: Vector) -> tuple[Vector, Vector] | N
         if met:
             found = [round(own, DIGITS - round(log10(unit))) for own, unit in zip(z, size, strict=True)]
             inside = all(low <= own <= high for own, (low, high) in zip(found, plant.box, strict=False))
-            return (
-                (tuple(found[:n]), tuple(found[n:])) if inside and not any(map(out_of_range, found)) else None
-            )
+            sound = inside and not any(map(out_of_range, found))
+            return (tuple(found[:n]), tuple(found[n:])) if sound else None
     return None

@@ -61,10 +61,7 @@ def _read_column(name: str, field: Field | None, names: Names) -> Column | None:
     return found and replace(found, name=found.name or name)
 
 
-COLUMNS: Final = keys.Kind(
-    _read_columns,
-    keys.by_name({"anyOf": [{"type": "string"}, {"section": _COLUMN}]}),
-)
+COLUMNS: Final = keys.Kind(_read_columns, keys.by_name({"anyOf": [{"type": "string"}, {"section": _COLUMN}]}))
 
 
 def read_table(

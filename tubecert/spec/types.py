@@ -35,9 +35,8 @@ class Spec:
     units: tuple[tuple[str, str], ...]
     parameters: tuple[tuple[str, Fraction], ...]
     ranges: tuple[tuple[str, Ends], ...] = ()
-    definitions: tuple[str, ...] = field(
-        default=(), compare=False
-    )  # names: expressions have them written out
+    # names alone: expressions have them written out
+    definitions: tuple[str, ...] = field(default=(), compare=False)
     tables: tuple[Lookup, ...] = ()
     f: tuple[Term, ...]
     drift: tuple[Term, ...] = ()
