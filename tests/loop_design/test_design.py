@@ -276,16 +276,25 @@ hardware: {rate: 1, noise: 0.001}
 """
 
 
+@pytest.mark.slow
 def test_a_sample_may_last_twenty_times_as_long_as_a_mode_takes():
     found = certify(load_text(LAG)).result
     assert found.verdict == "certified"
     assert 0.01 / 20 < found.tube[0].half_widths["x"] < 1.1 * 0.01 / 20
 
 
+@pytest.mark.slow
 def test_a_wind_that_is_too_strong_is_not_told_as_what_is_not_linear():
     (lack,) = certify(load_text(LAG.replace("bound: 0.01", "bound: 40") + "controller: none\n")).result.lacks
     assert (lack.kind, lack.where) == ("safe_set", "x")
     assert lack.needed == pytest.approx(1, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning", "ignore:invalid value:RuntimeWarning")
+def test_of_a_sample_that_lasts_too_long_for_floats_no_number_is_told():
+    found = certify(load_text(LAG.replace("-20*x", "-100000*x") + "controller: none\n"))
+    assert [(lack.kind, lack.allowed) for lack in found.result.lacks] == [("no_fixed_point", None)]
 
 
 @pytest.mark.slow

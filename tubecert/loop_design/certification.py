@@ -98,9 +98,8 @@ def _answer(remainders: Remainders, report: Progress | None) -> tuple[Result, No
             where = "" if error.where is None else names[error.where]
             lack = Lack(kind=error.kind, where=where, needed=error.needed, allowed=error.allowed)
             if error.kind == "no_fixed_point" and error.where is not None and error.allowed is not None:
-                beyond = error.allowed - float(
-                    space_of(remainders)[error.where]
-                )  # without what is not linear
+                # without what is not linear
+                beyond = error.allowed - float(space_of(remainders)[error.where])
                 lack = lack if beyond < 0 else Lack(kind="safe_set", where=where, needed=beyond)
             missed = (remainders.defect > _DEFECT * space_of(remainders)).any()
             return replace(plain, lacks=(lack,)), Notes(missed=fitting(loop) if missed else None)

@@ -30,7 +30,7 @@ ROOM = 0.95  # of an input may be used without a price: rigorous bounds are a li
 FREE = 0.05  # what an input that nothing limits counts, beside the widths
 SLOW = 0.03  # what lags count: twice as many must make the tube 2 % smaller
 LONG = 3000  # lags, and more cost in proportion: they take long to prove
-BRIEF = 100  # the same where nothing pushes, of every state: all that a loop has to do is to return
+BRIEF = 100  # the same, once for every state, where neither h nor wind acts: the loop has only to return
 SEEN = 2.0  # times the noise of a state: to know it better than that is worth nothing
 LATER = 1.0  # what the long run counts beside the tube for ever, where the start makes them differ
 GROWN = 10.0  # times its width without remainders is the most that a state is compared with
@@ -89,9 +89,8 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
         raise NoDesign("inputs", j, float(needed[j]), float(plant.room[j]))
     size, moved = settle(own, response.gain, response.ever, MANY)
     (W, U), first = np.split(size * np.r_[s, u], [len(s)]), alone[: len(s)] * s
-    if (
-        moved > STILL and not plant.start.any()
-    ):  # one that falls after a start has a smaller remainder than at first
+    # a tube that narrows after a start has a smaller remainder than at first
+    if moved > STILL and not plant.start.any():
         worst = int(np.argmax(W / first))
         raise NoDesign("no_fixed_point", worst, float(W[worst]), float(first[worst]))
     (n, m), table = plant.B.shape, search.observer.rounded(theta)

@@ -20,8 +20,8 @@ _QUIET: Final = 1e-300  # what is smaller is a 0 that was rounded outward
 _FEW: Final = 48  # windows for a search
 _SHARE: Final = 0.1  # of the safe set: where the remainder is fitted
 _ROOM: Final = 1.0  # of an input without limits, there
-_DOUBLED: Final = 10  # times at most, until inputs can undo a start
 _HORIZON: Final = 3.0  # sample times and delays after which a signal's effect is the unit of a state
+_DOUBLED: Final = 10  # how often at most these are doubled, until inputs can undo a start
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,7 +132,7 @@ def flow(A: Array, columns: Array, time: float) -> tuple[Array, Array]:
 def in_units(plant: Plant) -> Plant:
     """The same plant, counted in what signals do to it before feedback answers: no result depends on the user's units.
 
-    These are not finite where too much happens within a sample.
+    A start that inputs cannot undo so fast has more time. Units are not finite where too much happens within a sample.
     """
     horizon, room = _HORIZON * (plant.sample_time + plant.delay), np.minimum(plant.room, 1 / _QUIET)
     with np.errstate(all="ignore"):

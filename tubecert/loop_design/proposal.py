@@ -151,7 +151,8 @@ def _fixed_point(inequalities: Inequalities, report: Report | None) -> Boxes:
                 *(np.maximum(old, _WIDER * new + 1e-30) for old, new in zip(boxes, found, strict=True))
             )
     worst, nothing = int(np.argmax(found.W[0] / widest)), Boxes(*map(np.zeros_like, boxes))
-    raise NoDesign("no_fixed_point", worst, allowed=float(inequalities.of(nothing).W[0][worst]))
+    linear = float(inequalities.of(nothing).W[0][worst])
+    raise NoDesign("no_fixed_point", worst, allowed=linear if np.isfinite(linear) else None)
 
 
 def _within(inner: Boxes, outer: Boxes, share: float) -> bool:
