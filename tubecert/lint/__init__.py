@@ -55,7 +55,8 @@ def _left_out(spec: Spec) -> Iterator[Finding]:
         help = (
             "name the computer, hardware: {rate: 500}, in place of the metric: its loop is proven with them"
         )
-        yield from [note(LEFT_OUT, "system.parameters", message, help)] if spec.gained else []
+        if spec.gained:
+            yield note(LEFT_OUT, "system.parameters", message, help)
         return
     for output in spec.outputs:
         if output.name in dict(spec.tube.half_widths):

@@ -168,9 +168,8 @@ def _beyond_limits(spec: Spec, curve: Curve) -> Iterator[Finding]:
                 f"{'hold another point' if held else 'plan with less of it'}, or give limits.{name} more room: "
                 "what a controller adds comes on top"
             )
-            yield finding(
-                spec, codes.PLAN_BEYOND_LIMITS, "trajectory.input" if held else "trajectory.u", message, help
-            )
+            path = "trajectory.input" if held else "trajectory.u"
+            yield finding(spec, codes.PLAN_BEYOND_LIMITS, path, message, help)
 
 
 def _defect(spec: Spec, curve: Curve, model: ControlAffineModel) -> Iterator[Finding]:

@@ -351,7 +351,7 @@ def distance_bound(setting: Setting, gains: Gains, proof: DistanceProof) -> Dist
         return None
     Y, e, S = proof.speed, proof.prediction_error, proof.uncertainty
     if not (
-        e >= 0 < Y  # then S is, too: with a negative Y or e what is asked for would be less than it is
+        e >= 0 < Y  # then S >= 0, too: with a negative Y or e less would be asked for than is needed
         and (n.h_t + n.h_x * Y) / omega <= S  # (4.1)
         and _error(setting, gains, Y) <= e  # (4.2), (7.9)
         and speed_needed(setting, gains.projection_radius, n.h_initial.max(S) + e) < Y  # (4.3)

@@ -1,9 +1,9 @@
 """Terms that vanish identically: quotients of polynomials over the rationals, exact.
 
 Variables, roots and transcendental terms are indeterminates; the relations used are the addition theorems,
-sin^2 = 1 - cos^2, sqrt(u)^2 = u, the hyperbolic functions in terms of exp,
-and the values at 0 (of sqrt: at squares of rationals). A term whose numerator reduces
-to 0 vanishes wherever it is defined; nothing is concluded from one that does not.
+sin^2 = 1 - cos^2, sqrt(u)^2 = u, the hyperbolic functions in terms of exp, and the values at 0 (of sqrt: at squares of
+rationals). A term whose numerator reduces to 0 vanishes wherever it is defined; nothing is concluded from one that does
+not.
 
 Addition theorems: sines, cosines and exponentials of sums and multiples, in those of common parts.
 
@@ -169,7 +169,7 @@ def _exponentials(terms: Sequence[Term]) -> list[Term]:
 class _Field:
     """Quotients over a ring in which what is found later comes first: a relation leads with its square.
 
-    Raises `OverflowError` once they took more products of terms than what vanishes is worth.
+    Raises `OverflowError` after `_MOST` products of terms: then nothing is known.
     """
 
     def __init__(self, ring: Any, generators: Sequence[Polynomial]) -> None:

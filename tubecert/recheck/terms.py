@@ -107,11 +107,8 @@ def _kept(key: tuple[object, ...], op: str, args: tuple[Term, ...], value: Value
 
 def number(q: Fraction | int) -> Term:
     """A rational constant."""
-    key = (
-        "const",
-        q.numerator,
-        q.denominator,
-    )  # the hash of a fraction costs as much as a product of polynomials
+    # the hash of a fraction costs as much as a product of polynomials
+    key = ("const", q.numerator, q.denominator)
     return _known.get(key) or _kept(key, "const", (), q if isinstance(q, Fraction) else Fraction(q))
 
 

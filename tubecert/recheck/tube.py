@@ -13,7 +13,7 @@ Implements: theory (0.3), (1.6).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
 from flint import arb
@@ -33,11 +33,10 @@ _INNER = 1 - 1e-9
 _FAR = 1e80  # from 1 in either direction: within it no square, product or quotient of these leaves the range of floats
 
 
-def _square(rho: Fraction, *others: Fraction) -> float:
-    """rho^2 from above; raises `ValueError` where floats might lose points of the tube."""
-    if not all(1 / _FAR <= q <= _FAR for q in (rho, *others)):
+def _check_floats(sizes: Iterable[Fraction]) -> None:
+    """Raises `ValueError` where floats might lose points of a tube with such sizes."""
+    if not all(1 / _FAR <= q <= _FAR for q in sizes):
         raise ValueError("the tube is too wide or too narrow for floats")
-    return math.nextafter(float(rho * rho), math.inf)
 
 
 class Round:
@@ -45,7 +44,8 @@ class Round:
 
     def __init__(self, rho: Fraction) -> None:
         self._rho = exact(rho)
-        self._square = _square(rho)
+        _check_floats([rho])
+        self._square = math.nextafter(float(rho * rho), math.inf)
 
     def extent(self, state: int) -> float:
         """The radius."""
@@ -101,7 +101,8 @@ class Ellipsoid:
 
     def __init__(self, coordinates: Coordinates, rho: Fraction, sides: Numbers) -> None:
         self._spread, self._rho, self._sides = coordinates.spread, rho, sides
-        self._square = _square(rho, *sides)
+        _check_floats([rho, *sides])
+        self._square = math.nextafter(float(rho * rho), math.inf)
         self._forms: dict[tuple[int, ...], _Form] = {}
         whole = [ceiling(exact(rho) * root(exact(row[i]))) for i, row in enumerate(self._spread)]
         self._extents = [min(reach, ceiling(exact(side))) for reach, side in zip(whole, sides, strict=True)]
@@ -174,7 +175,7 @@ class _Form:
             for i in range(len(block))
         ]
         self._weights, self._rows = _squares(Q)
-        _square(*self._weights, *(abs(l) for row in self._rows for l in row if l))
+        _check_floats([*self._weights, *(abs(l) for row in self._rows for l in row if l)])
         self._least = [math.nextafter(float(d), 0.0) for d in self._weights]
         self._floats = [[float(l) for l in row] for row in self._rows]
         n = range(len(which))

@@ -34,7 +34,8 @@ from tubecert.recheck.specified.trajectory import Expressed, Resting
 from tubecert.recheck.terms import operation, variable
 
 _SHIPPED: Final = Path(__file__).parents[2] / "controller"
-_OWN: Final = (_DATA := "controller_data.h", "README.txt")
+_DATA: Final = "controller_data.h"
+_OWN: Final = (_DATA, "README.txt")
 _RUNTIME: Final = ("controller.c", "controller.h", "selftest.c")
 _ROUNDING: Final = Fraction(1, 2**21)  # of |x| and a width: more than rounding makes of a sample
 _PLAN: Final = re.compile(r"XS\[ROWS\]\[NX\] = ([^;]*);.*\n.* US\[ROWS\]\[NU\] = ([^;]*);")
