@@ -31,15 +31,13 @@ class ExitCode(IntEnum):
 class TubecertError(Exception):
     """Something the user has to know, as findings, with the exit code it leads to; its text is that of the findings."""
 
-    exit_code = ExitCode.INVALID
-
-    def __init__(self, findings: Sequence[Finding]) -> None:
-        self.findings = tuple(findings)
+    def __init__(self, findings: Sequence[Finding], exit_code: ExitCode = ExitCode.INVALID) -> None:
+        self.findings, self.exit_code = tuple(findings), exit_code
         super().__init__("\n".join(map(str, self.findings)))
 
-    def __reduce__(self) -> tuple[type[TubecertError], tuple[tuple[Finding, ...]]]:
-        """From its findings, as it was made: an error crosses processes like any value."""
-        return type(self), (self.findings,)
+    def __reduce__(self) -> tuple[type[TubecertError], tuple[tuple[Finding, ...], ExitCode]]:
+        """From its findings and its code, as it was made: an error crosses processes like any value."""
+        return type(self), (self.findings, self.exit_code)
 
 
 class SpecError(TubecertError):

@@ -59,9 +59,8 @@ def data_of(certificate: Certificate) -> Data:
     """The controller of a certificate; raises TC710 if it has none, or does not say `certified`."""
     result, tables = certificate.result, certificate.result.controller
     if result.verdict is not Verdict.CERTIFIED:
-        error = refused(f"the certificate says {result.verdict}", "tubecert report tells what is missing")
-        error.exit_code = result.verdict.exit_code
-        raise error
+        message, help = f"the certificate says {result.verdict}", "tubecert report tells what is missing"
+        raise refused(message, help, result.verdict.exit_code)
     if tables is None or not (tables.M.any() or tables.N.any()):
         raise refused("the certificate has no controller", "certify with `controller: auto`")
     return Data(certificate, tables)

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from tubecert.enclosure.interval import Array
-from tubecert.errors import TubecertError
+from tubecert.errors import ExitCode, TubecertError
 from tubecert.expression import FUNCTIONS
 from tubecert.findings import Finding
 from tubecert.model import build
@@ -33,9 +33,9 @@ _MOST_ROWS: Final = 1_000_000
 _SIGNS: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 
 
-def refused(message: str, help: str = "") -> TubecertError:
+def refused(message: str, help: str, exit_code: ExitCode = ExitCode.INVALID) -> TubecertError:
     """The error for a certificate that no code can be written for."""
-    return TubecertError([Finding(code="TC710", message=message, help=help)])
+    return TubecertError([Finding(code="TC710", message=message, help=help)], exit_code)
 
 
 def question(result: Result) -> Spec:

@@ -39,9 +39,7 @@ METRIC_NAME: Final = asking.Text(
 )
 DECIDING: Final = (*words_of(), ALL)
 AUTO: Final = "auto"  # the gap of each constant by its effect
-_OF_SEARCH: Final = Fraction(
-    1, 2
-)  # of the time: the certification with the metric that is found has the rest
+_OF_SEARCH: Final = Fraction(1, 2)  # of the time: the certification with the metric has the rest
 PAIR: Final = ("bandwidth", "adaptation_rate")
 _GAP: Final = (
     "Relative width at which a constant is sharp enough; auto: of each by its effect on the gains.  "
@@ -148,9 +146,8 @@ def certify(
 def _too_late() -> TubecertError:
     """The error where the time is up before anything is decided."""
     help = "more time, a wider gap, or a smaller safe set or tube"
-    error = TubecertError([Finding(code="TC112", message="undecided: the deadline has passed", help=help)])
-    error.exit_code = ExitCode.UNDECIDED
-    return error
+    finding = Finding(code="TC112", message="undecided: the deadline has passed", help=help)
+    return TubecertError([finding], ExitCode.UNDECIDED)
 
 
 def ran(function: str) -> Callable[[], Mapping[str, object]]:

@@ -184,9 +184,8 @@ def _sampled(
     if not result.tube or result.controller is None or result.nominal is None:
         reason = found.reasons[0].message if found.reasons else "nothing was found"
         message = f"there is no tube that a simulation could leave ({found.verdict}: {reason})"
-        error = TubecertError([Finding(code="TC703", message=message, help="tubecert certify tells more")])
-        error.exit_code = found.verdict.exit_code
-        raise error
+        finding = Finding(code="TC703", message=message, help="tubecert certify tells more")
+        raise TubecertError([finding], found.verdict.exit_code)
     compared(system, result).require(system, "the certificate")
     default, system = system.simulation or Section(), as_set(system, result.spec.settings)
     own = campaign(

@@ -146,9 +146,8 @@ def require_tube(result: Result) -> None:
     why = "certification stopped" if reason is None else reason.sentence
     message = f"there is no tube that a simulation could leave ({result.verdict}: {why})"
     help = advice(reason.relax if reason else ()) or "tubecert certify tells more"
-    error = TubecertError([Finding(code="TC703", message=message, help=help)])
-    error.exit_code = (result.verdict if result.verdict is Verdict.REFUTED else Verdict.UNDECIDED).exit_code
-    raise error
+    verdict = result.verdict if result.verdict is Verdict.REFUTED else Verdict.UNDECIDED
+    raise TubecertError([Finding(code="TC703", message=message, help=help)], verdict.exit_code)
 
 
 def setting_of(
