@@ -37,6 +37,7 @@ _KEYS: Final = {
     "metric file": {"format", "solver", "verified_on"},
     "json": {"certificates", "quantities", "differences"},
 }
+_CALLED: Final = {"html": "page", "markdown": "page", "csv": "comparison", "json": "comparison"}
 
 _VERSIONED = re.compile(r"tubecert-(certificate|sampled-loop)/\d{1,9}", re.ASCII)
 
@@ -166,11 +167,11 @@ def spare(
     if target == STDOUT:
         return
     for name, source in inputs.items():
-        same = source and os.path.abspath(source) == os.path.abspath(target)
-        if source and (same or same_file(target, source)):
+        if source is not None and _is_same(target, source):
             raise refused(f"{visible(target)} is the {name} itself and would be overwritten", help)
     if what and Path(target).is_file() and not _written_as(what, target):
-        raise refused(f"{visible(target)} is no {what} that tubecert wrote, and would be overwritten", help)
+        called = _CALLED.get(what, what)
+        raise refused(f"{visible(target)} is no {called} that tubecert wrote, and would be overwritten", help)
 
 
 def _written_as(what: str, path: str) -> bool:
@@ -230,10 +231,10 @@ def write_bytes(target: str, data: bytes, remedy: str = REMEDY) -> None:
         raise _unwritable(target, error.strerror or str(error), remedy) from error
 
 
-def same_file(target: str, source: str | Path) -> bool:
-    """Whether two paths name the same existing file."""
+def _is_same(target: str, source: str | Path) -> bool:
+    """Whether two paths name the same file, which need not exist."""
     try:
-        return Path(target).samefile(source)
+        return os.path.abspath(source) == os.path.abspath(target) or Path(target).samefile(source)
     except (OSError, ValueError):
         return False
 
