@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -64,7 +64,9 @@ def certify(
     system = load(spec, settings)
     if system.hardware:  # which has no search that could look at the time: the command is ended then
         asked.pop("deadline", None)
-    kept = _kept_place(spec, system, output, synthesised=metric is None)
+    taken = {"specification": spec, "plan": plan_of(spec, system)}
+    spare(output, "certificate", taken)
+    kept = _kept_place(output, system, taken) if metric is None else None
     if kept is not None:
         telling.warn_of_size(system, how)
     with telling.shown(how, telling.kept(lambda so_far: _will(so_far, kept))) as progress:
@@ -104,18 +106,16 @@ def _will(found: Synthesised, target: str | None) -> keeper.Will | None:
     return {"files": {target: text}, "said": "", "code": ExitCode.UNDECIDED.value}
 
 
-def _kept_place(file: str, system: Spec, beside: str, *, synthesised: bool) -> str | None:
+def _kept_place(beside: str, system: Spec, inputs: Mapping[str, str | Path | None]) -> str | None:
     """Where a metric that is synthesised on the way is kept: beside the certificate; None if there will be none.
 
     Raises `TargetError` if it cannot go there, or would take the place of an input or of what somebody wrote by hand.
     """
-    plan = plan_of(file, system)
-    spare(beside, "certificate", {"plan": plan})
-    if beside == certificate.STDOUT or not synthesised or system.metric or system.synthesis is None:
+    if beside == certificate.STDOUT or system.metric or system.synthesis is None:
         return None
     target = str(Path(f"{stem_of(beside)}.metric.json"))
     certificate.check_target(target)
-    spare(target, "metric file", {"specification": file, "plan": plan})
+    spare(target, "metric file", inputs)
     return target
 
 

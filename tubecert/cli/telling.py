@@ -73,7 +73,7 @@ class Told:
     judged: Callable[[Synthesised], None] | None
     last: Step | None = None
     when: float = 0.0
-    told: set[tuple[Phase, str]] = field(default_factory=set)
+    ended: set[tuple[Phase, str]] = field(default_factory=set)
 
     def found(self, line: str) -> None:
         """A line about what was found."""
@@ -91,9 +91,9 @@ class Told:
         self.when = now
         if before is not None and new and before.phase in _CLAIMS:
             key = before.phase, before.name
-            if key not in self.told:  # closer bounds of the same constants come later
+            if key not in self.ended:  # closer bounds of the same constants come later
                 found(came_to(before))
-            self.told.add(key)
+            self.ended.add(key)
         keeper.tell({"at": visible(described(step)), "next": next_step(step.phase)})
 
 
