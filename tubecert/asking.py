@@ -167,7 +167,7 @@ class Settings(Kind):
 
         if isinstance(value, Mapping):
             return value
-        items = [value] if isinstance(value, str) or not isinstance(value, Iterable) else value
+        items = value if isinstance(value, Iterable) and not isinstance(value, str) else [value]
         place = self.called if asker().options else name
         return each_of(items, lambda x: x if isinstance(x, Setting) else Setting.of(text_of(name, x), place))
 
@@ -291,7 +291,8 @@ def question(words: Words, *pairs: tuple[str, str]) -> Callable[[Callable[P, R]]
                 raise TypeError(f"{function.__name__}() {error}; it takes {known}") from None
             bound.apply_defaults()
             bound.arguments |= read(kinds, bound.arguments, pairs)
-            if not callable(progress := bound.arguments.get("progress") or id):
+            progress = bound.arguments.get("progress")
+            if progress is not None and not callable(progress):
                 refuse("progress", "", f"{shown(progress)} cannot be called with steps", code="TC106")
             with asked_by(words=kinds, given=bound.arguments):
                 return function(*bound.args, **bound.kwargs)
@@ -395,7 +396,7 @@ def _finding(
 def text_of(name: str, value: Any) -> str:
     """A text, or a path as one; raises `SpecError` for what is none."""
     if not isinstance(value, (str, os.PathLike)):
-        raise SpecError([_finding(name, "", f"{shown(value)} is no text and no path", code="TC106")])
+        refuse(name, "", f"{shown(value)} is no text and no path", code="TC106")
     return os.fspath(value)
 
 
@@ -404,7 +405,7 @@ def text_of_number(value: Any, name: str) -> str:
     text = value if isinstance(value, str) else plain_number(value)
     if text is None:
         help = "give an int, a float, a Fraction, a Decimal or a text"
-        raise SpecError([_finding(name, "", f"{shown(value)} is no number", help, code="TC106")])
+        refuse(name, "", f"{shown(value)} is no number", help, code="TC106")
     return text
 
 

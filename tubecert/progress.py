@@ -44,11 +44,10 @@ class Step:
 
     `name`: of what is worked on: a constant, a claim, a file, a controller. `count`: what the search for it has
     examined, in `unit`s, and `share` how much of it is proven (0 where nobody knows); what it searches, which may be
-    that constant in other units or its inverse, is proven to lie between `below` and `above`.
-    `done` of `of` pieces of the whole phase are finished; None if nobody knows how many
-    there are. `seconds` since the call began; `left`: an estimate of the seconds until the phase is done, if those to
-    come are like those before; None where there is nothing to go by.
-    `least`: it is without the piece that is worked on, which takes longer than those before it.
+    that constant in other units or its inverse, is proven to lie between `below` and `above`. `done` of `of` pieces of
+    the whole phase are finished; None if nobody knows how many there are. `seconds` since the call began; `left`: an
+    estimate of the seconds until the phase is done, if those to come are like those before; None where there is nothing
+    to go by. `least`: it is without the piece that is worked on, which takes longer than those before it.
     """
 
     phase: Phase

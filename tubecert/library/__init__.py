@@ -7,8 +7,7 @@ was made so by the pipeline, and is what the certificate says. A command is a cl
 |---|---|
 | `certifying`, `metrics`, `simulating`, `sweeping`, `rechecking` | functions with the names of commands |
 | `pages`, `comparing`, `exporting` | the same |
-| `shown` | what shows itself; which files nothing is written over |
-| `certification`, `sampled`, `stated`, `simulation`, `reading` | what they give, as values |
+| `certification`, `sampled`, `stated`, `simulation`, `reading`, `shown` | what they give, as values |
 | `plain`, `specification` | values of Python as a specification; `check` |
 | `workers` | who helps: processes, or a cluster |
 """

@@ -105,9 +105,8 @@ class Certification(Stated[Certificate]):
 
         Raises `KeyError` for a kind that there is not.
         """
-        return self.result.sections.get(
-            Known((word, name.key) for name in NAMES for word in (name.letter, name.option, name.key))[kind]
-        )
+        words = {word: name.key for name in NAMES for word in (name.letter, name.option, name.key)}
+        return self.result.sections.get(Known(words)[kind])
 
     # the tube
 

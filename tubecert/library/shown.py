@@ -22,11 +22,11 @@ T = TypeVar("T")
 class UnknownNameError(SpecError, KeyError):
     """A name that there is not: an error of tubecert, and that of a mapping."""
 
-    __str__ = Exception.__str__
+    __str__ = Exception.__str__  # that of KeyError shows the quoted text
 
 
 class Known(dict[str, T]):
-    """Values by name, which tells the names where there is no such one."""
+    """Values by name; for a name that is none it raises an error that tells those that there are."""
 
     def __missing__(self, name: str) -> T:
         help = suggestion(str(name), self, what="there are") if self else "there is none"

@@ -12,7 +12,8 @@ import numpy as np
 
 from tubecert.asking import text_of
 from tubecert.errors import ExitCode
-from tubecert.library.shown import Known, Shown
+from tubecert.findings import Finding
+from tubecert.library.shown import Known, Shown, UnknownNameError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,9 +73,12 @@ class _Campaign(Shown):
         from tubecert.simulation.figures import drawn
 
         drawers = import_module(self.drawn_in).DRAWERS
-        own = Known({each: each for each in drawers} | dict(self.within))[name]
+        own = Known({each: each for each in drawers} | {**self.within})[name]
         found = drawn(drawers, own, self.campaign)
-        return Known({})[name] if found is None else found
+        if found is None:
+            message = f"there is nothing that {name} could show"
+            raise UnknownNameError([Finding(code="TC112", message=message)])
+        return found
 
     def save(self, folder: File) -> list[str]:
         """Write summary, runs and, of a whole campaign, figures into a folder, as the command does; their names.

@@ -230,9 +230,8 @@ def _axes(over: Mapping[str, Range] | Iterable[str]) -> list[Axis]:
     """The ranges; raises `SpecError` with everything that is wrong with them."""
     if not over:
         own = asking.named("over")
-        asking.refuse(
-            own, "", f"{own} says which keys have which values", f"for example {own} tube.epsilon=.1:.6:6"
-        )
+        help = f"for example {own} tube.epsilon=.1:.6:6"
+        asking.refuse(own, "", f"{own} says which keys have which values", help)
     words: Iterable[str] = over
     if isinstance(over, Mapping):
         words = (f"{key}={_range(key, values)}" for key, values in over.items())
