@@ -191,7 +191,7 @@ def test_degrees_are_shown_as_degrees():
 
 @pytest.mark.parametrize(("missed", "told"), [
     ("input: [2]", "it is no equilibrium: input: [2] is"),
-    ("", "it misses its own equations, or ends in no rest: tubecert check"),
+    ("", "it misses its equations, or does not end at rest: tubecert check"),
 ])  # fmt: skip
 def test_a_plan_that_misses_its_own_equations_is_told_on_the_first_screen(missed, told):
     certificate = sampled.certificate()

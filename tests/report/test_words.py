@@ -73,7 +73,7 @@ def test_every_word_of_a_comparison_of_metrics_has_a_page():
     row = MetricRow(
         rate=Fraction(1), floor="input", degree=2, condition_number=3.0, verdict=Verdict.CERTIFIED
     )
-    heads = _compared([row]).columns
+    heads = _compared([row], None).columns
     assert "beta/sqrt(a)" in heads
     assert [word for word in [*heads, *FLOORS.values()] if not pages.find(word)] == []
 

@@ -10,7 +10,7 @@ import pytest
 from commands import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from texts import CONFIGS
+from texts import CONFIGS, OLDER_METRIC
 
 from tubecert import pipeline
 from tubecert.certificate.result import MetricRow
@@ -30,7 +30,6 @@ from tubecert.verdict import Verdict
 ROBOTS = Path(__file__).parents[1] / "specs" / "robots"
 BARE = Synthesis(rate=None, objective="adaptation")
 BY_B = Options(conditions="distance")
-OLDER = '{"format": 1, "solver": 1, "verified_on": 1}'  # a metric file of tubecert, as far as it is looked at
 
 
 def robot(name):
@@ -92,10 +91,10 @@ def test_where_nothing_certifies_nothing_is_written(tmp_path):
     text = (ROBOTS / "pendulum.yaml").read_text().replace("epsilon: 0.1", "epsilon: 1")
     path, target = tmp_path / "wide.yaml", tmp_path / "wide.json"
     path.write_text(text)
-    target.write_text(OLDER)
+    target.write_text(OLDER_METRIC)
     done = synth(path, "-o", target)
     assert done.exit_code == 4
-    assert target.read_text() == OLDER
+    assert target.read_text() == OLDER_METRIC
     assert "certifies: the tube leaves the safe set" in " ".join(done.stdout.split())
     assert "reduce epsilon" in done.stdout
     found = pipeline.synthesise(load_text(text), BARE, BY_B)
@@ -376,13 +375,13 @@ def test_an_interruption_tells_what_was_tried_where_nothing_certified(monkeypatc
     assert "epsilon: 0.2" in text
     hopeless, target = tmp_path / "hopeless.yaml", tmp_path / "m.json"
     hopeless.write_text(text.replace("epsilon: 0.2", "epsilon: 5"))  # larger than the safe set
-    target.write_text(OLDER)
+    target.write_text(OLDER_METRIC)
     done = synth(hopeless, "-o", target)
     assert done.exit_code == 130
     assert "interrupted: no metric that certifies was found by then" in done.stdout
     assert "kappa" in done.stdout
     assert "reduce epsilon" in done.stdout
-    assert target.read_text() == OLDER
+    assert target.read_text() == OLDER_METRIC
 
 
 def test_the_verdict_is_told_before_advice(monkeypatch):

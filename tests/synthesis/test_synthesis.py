@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from systems import plain_model as model
 from systems import values
-from texts import ROOT
+from texts import OLDER_METRIC, ROOT
 
 from tubecert.claims.failures import NotProven, VariableForbidden
 from tubecert.claims.statements import MetricContraction
@@ -54,7 +54,6 @@ ARM = model(
 OBLIQUE = model(("x", "y"), ("-x + 2*y", "-0.25*y**3 - 3*x + 4*y"), [["0.5"], ["-2"]])
 ROLLING = model(("a", "b", "c"), ("b + sin(a)", "c - a**2", "-c"), [["0"], ["0"], ["1 + exp(a)/2"]])
 MODELS = [CART_POLE, ARM, OBLIQUE, ROLLING]
-OLDER = '{"format": 1, "solver": 1, "verified_on": 1}'  # a metric file of tubecert, as far as it is looked at
 
 
 @pytest.mark.slow
@@ -242,11 +241,11 @@ def test_a_lying_solver_writes_no_file(kind, tmp_path, monkeypatch):
 
     monkeypatch.setattr(synthesis, "routes", lambda choice: (("cegis", cegis.propose),))
     target = tmp_path / "metric.json"
-    target.write_text(OLDER)
+    target.write_text(OLDER_METRIC)
     spec = str(ROOT / "configs" / "two_state.yaml")
     done = run("synth", spec, "--rate", "1.7", "--degree", "0", "-v", "-o", target)
     assert done.exit_code == 4
-    assert target.read_text() == OLDER
+    assert target.read_text() == OLDER_METRIC
     assert "undecided two_state" in done.output
     assert "Tried" in done.output
 

@@ -66,15 +66,15 @@ def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None
         return [part.finding(name)]
     if (knots := plan.knots) and len({*zip(knots.x, knots.u, strict=True)}) == 1:
         point = Plan(tuple(map(constant, knots.x[0])), tuple(map(constant, knots.u[0])), plan.horizon)
-        plan = plan if any(row[0] is not ZERO for row in point.defect(model)) else point  # exactly at rest
+        if all(row[0] is ZERO for row in point.defect(model)):  # exactly at rest
+            plan = point
     parts = [*_horizon(plan, spec, family), *_boxes(plan, family, bundle, effort)]
     parts += _held(plan, family, bundle, effort)
     parts.append(_defect(plan, model, bundle.defect, effort))
     missed = [part.finding(name) for part in parts if not part.kept]
     if missed:
         return missed
-    defect = parts[-1].words
-    message = f"{name} is a plan of the family: {defect}"
+    message = f"{name} is a plan of the family: {parts[-1].words}"
     help = f"the state must start within {near(family.within or 0)} of where the plan starts"
     return [Finding(code=NO_MEMBER, severity=Severity.NOTE, message=message, help=help)]
 

@@ -66,7 +66,7 @@ class Row(MetricRow):
 
     @property
     def idle(self) -> bool:
-        """Whether the filter that it needs is slower than its own contraction: faster ones gain by their feedback."""
+        """Whether the filter that it needs is slower than its own contraction: faster rates gain by feedback alone."""
         return self.bandwidth is not None and self.bandwidth < self.rate
 
     @property
@@ -77,7 +77,7 @@ class Row(MetricRow):
     def score(self, objective: str) -> tuple[float, ...]:
         """Smaller is better; what is certified comes first."""
         rank, without = (0, self.rho or inf) if self.counts else (1, inf)
-        demand = without if self.demand is None else self.demand
+        demand = without if self.demand is None else self.demand  # without adaptation the radius counts
         if objective == "tube":
             size = self.rho if self.width is None else self.width
             # a slower metric has to be worth it

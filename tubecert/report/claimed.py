@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tubecert.certificate.result import Result
     from tubecert.enclosure.constant import Witness
 
-_WIDER = 1.1  # times as wide as it is a range may be shown
+_WIDER = 1.1  # times its width is what rounding may make of a range
 NOT_RECHECKED = (
     "Not rechecked: this is what the certificate says; whether it is true, tubecert recheck examines."
 )
@@ -90,9 +90,9 @@ def size(bound: Fraction) -> str:
 
 
 def ends(low: Fraction | float, high: Fraction | float, limits: Sequence[Fraction] | None = None) -> str:
-    """Ends of a range, rounded outward; where rounding is all, as they are.
+    """Ends of a range, rounded outward to so many digits that it is hardly wider, and not beyond limits that it keeps.
 
-    There are so many digits that it is hardly wider than it is, and not beyond limits that it keeps to.
+    What is next to round numbers, up to rounding errors, is said to be these, within a bound of the errors.
     """
     rounded = [(down(low, digits), up(high, digits)) for digits in range(4, 18)]
     least, most = limits or (-math.inf, math.inf)

@@ -61,8 +61,8 @@ def _of_kind(result: Result, key: str) -> list[tuple[str, float]]:
 
 
 def _began(recipe: Recipe) -> str:
-    alone = isinstance(recipe, NoGains)
-    return f"the start, until the {'feedback has made it good' if alone else 'filter has learned the uncertainty'}"
+    alone, adapting = "feedback has made it good", "filter has learned the uncertainty"
+    return f"the start, until the {alone if isinstance(recipe, NoGains) else adapting}"
 
 
 def _pushes(result: Result, n: Numbers[Interval], recipe: Recipe) -> Iterator[tuple[str, Interval]]:

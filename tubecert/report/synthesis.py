@@ -103,8 +103,8 @@ def _limits(limits: RateLimits) -> Iterator[str]:
         yield f"{side}: at {exact(limit.rate)} 1/s {_CAUSES[limit.cause].format(more=more)}"
 
 
-def _compared(found: Sequence[MetricRow], file: MetricFile | None = None) -> Table:
-    """A metric a row: first, where no screen cuts it off, the one that was chosen."""
+def _compared(found: Sequence[MetricRow], file: MetricFile | None) -> Table:
+    """A metric a row: first, where no screen cuts it off, the one of the file, known by its rate and kappa."""
     best = None if file is None else (file.rate, up(file.condition_number.above))
     chosen = [row for row in found if (row.rate, up(row.condition_number)) == best]
     found = [*chosen, *(row for row in found if row not in chosen)]

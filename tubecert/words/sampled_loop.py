@@ -78,7 +78,7 @@ def plan(result: Result) -> str:
 
 def misses(fitting: str) -> str:
     """That the plan does not solve its own equations, and what would."""
-    moving = "it misses its own equations, or ends in no rest: tubecert check"
+    moving = "it misses its equations, or does not end at rest: tubecert check"
     return f"it is no equilibrium: {fitting} is" if fitting else moving
 
 
