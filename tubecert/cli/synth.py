@@ -85,9 +85,8 @@ def _will(so_far: Synthesised, system: Spec, target: str, how: Output) -> keeper
     if so_far.file is None:
         return None
     metric = metrics.metric_of(so_far, system)
-    said = text_of(
-        how, metric._page(), _closing(metric, system, target), metric._json() if how.json else None
-    )
+    data = metric._json() if how.json else None
+    said = text_of(how, metric._page(), _closing(metric, system, target), data)
     files = {} if target == certificate.STDOUT else {target: metric.text()}
     return {"files": files, "said": said, "code": metric.verdict.exit_code.value}
 

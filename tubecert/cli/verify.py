@@ -70,9 +70,8 @@ def verify(
     if output is not None and found[0].proven:
         found[0].save(output)
     if how.json:
-        write_stdout(
-            verification.as_json([(file, own.found) for (file, _), own in zip(cases, found, strict=True)])
-        )
+        judged = [(file, own.found) for (file, _), own in zip(cases, found, strict=True)]
+        write_stdout(verification.as_json(judged))
     elif not how.quiet:
         write_stdout(_closing(found, output))
     if expect:

@@ -140,10 +140,8 @@ class Swept(Shown):
         return [*rows, figures] if drawn else rows
 
     def _json(self) -> str:
-        rows = [dict(zip(self.table.header, row, strict=True)) for row in self.table.cells()]
-        return json_text(
-            [{k: exact_json(v) if isinstance(v, Fraction) else v for k, v in row.items()} for row in rows]
-        )
+        rows = [[exact_json(v) if isinstance(v, Fraction) else v for v in row] for row in self.table.cells()]
+        return json_text([dict(zip(self.table.header, row, strict=True)) for row in rows])
 
     @property
     def _exit_code(self) -> ExitCode:

@@ -47,9 +47,8 @@ def judged_row(row: Row, question: Question, outputs: Mapping[str, float] | None
     verdict = overall([sections[key].verdict for key in keys])
     short = next((s for key in keys if (s := sections[key]).verdict is not Verdict.CERTIFIED), None)
     gain, lower = problem.constants.metric_input_gain.above, problem.constants.lower.below
-    decisive = next(
-        (found for section in sections.values() if (found := _pair(question, section.data()))), None
-    )
+    pairs = (_pair(question, section.data()) for section in sections.values())
+    decisive = next(filter(None, pairs), None)  # of the kind that decides, else of B
     return replace(
         row,
         verdict=verdict,

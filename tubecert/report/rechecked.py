@@ -16,12 +16,11 @@ def page_of(found: Recheck, name: str, note: str = "") -> Page:
     """The page of a certificate in a file of this name; `note`: whose specification it is, if that was asked."""
     claims = sorted(found.claims, key=lambda item: item.outcome.holds)  # those first that are not confirmed
     rest = Facts.of(_rest(found))
+    said = f"the certificate says {found.stated}", _failing(found), note
     return Page(
         name=name,
         verdict=found.verdict,
-        summary=visible(
-            "; ".join(filter(None, (f"the certificate says {found.stated}", _failing(found), note)))
-        ),
+        summary=visible("; ".join(filter(None, said))),
         sections=(
             Section(key="claims", title="Claims", blocks=(_table(claims),)),
             Section(key="rest", title="Further", blocks=(rest,)),

@@ -102,9 +102,8 @@ def _screen(result: Result, notes: Notes) -> Iterator[Block]:
     told = (*_inputs(result), *_worst(result, notes), *_obstacles(result)) if proven else ()
     missed = [] if notes.missed is None else [("plan", misses(notes.missed))]
     if rows := [*told, *missed, *_lacking(result, notes)]:
-        yield Facts.of(
-            rows, tuple(name for name, _ in rows if name.startswith("fills") or name == "obstacles")
-        )
+        spare = tuple(name for name, _ in rows if name.startswith("fills") or name == "obstacles")
+        yield Facts.of(rows, spare)
 
 
 def _first(result: Result) -> Sequence[str]:
@@ -195,9 +194,8 @@ def _lacking(result: Result, notes: Notes) -> Iterator[tuple[str, str]]:
     for lack in result.lacks:
         if lack.where in notes.filled:
             yield f"fills {lack.where}", filling(notes.filled[lack.where], causes(result))
-    yield from (
-        ("help", help) for help in dict.fromkeys(remedy(lack, result, notes) for lack in result.lacks)
-    )
+    helps = dict.fromkeys(remedy(lack, result, notes) for lack in result.lacks)
+    yield from (("help", help) for help in helps)
 
 
 def _origin(certificate: Certificate) -> Facts:

@@ -120,9 +120,8 @@ def remedy(lack: Lack, result: Result, notes: Notes) -> str:
     filled = notes.filled.get(lack.where)
     most = "" if filled is None else max(SHARES, key=lambda name: float(getattr(filled, name)))
     help = _HELP[lack.kind] if lack.where or lack.kind != "no_design" else _FASTER
-    return help.format(
-        where=lack.where, largest=causes(result).get(most, "noise, wind, h, delay or the start")
-    )
+    largest = causes(result).get(most, "noise, wind, h, delay or the start")
+    return help.format(where=lack.where, largest=largest)
 
 
 def is_alone(effective: Effective) -> bool:
