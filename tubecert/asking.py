@@ -386,7 +386,7 @@ def refuse(name: str, text: str, message: str, help: str = "", *, code: str = "T
 
 
 def _finding(
-    name: str, text: str, message: str, help: str = "", *, code: str = "TC112", at: Sequence[int] = ()
+    name: str, text: str, message: str, help: str, *, code: str = "TC112", at: Sequence[int] = ()
 ) -> Finding:
     offset, width = at or (0, len(text))
     place = NamedPlace(file=name, line=1, column=offset + 1, source=text, width=width)

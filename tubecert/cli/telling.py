@@ -151,7 +151,7 @@ def found(line: str) -> None:
     keeper.tell({"found": visible(line)})
 
 
-def present(how: Output, page: Page, closing: Rows = (), data: str | None = None) -> None:
+def present(how: Output, page: Page, closing: Rows, data: str | None = None) -> None:
     """Shows the page, then files and next commands (with `--quiet` its headline alone); or writes `data`.
 
     With `data` the headline is on stderr.

@@ -50,7 +50,7 @@ class _Part:
         return Finding(code=code, message=f"{said}: {self.words}", help=help)
 
 
-def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None) -> list[Finding]:
+def membership(spec: Spec, family: Spec, name: str) -> list[Finding]:
     """What keeps the plan of `spec` from being one of `family`, or a note that it is one.
 
     Both have the same states and inputs; the dynamics are those of the family. Raises `ValueError` for a family that is
@@ -60,7 +60,7 @@ def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None
     if bundle is None or spec.trajectory.task is not None or spec.trajectory.bundle is not None:
         raise ValueError("a plan is compared with a family of plans")
     model = build(replace(family, metric=None, synthesis=None))
-    plan, effort = plan_of(spec, model), effort or Effort()
+    plan = plan_of(spec, model)
     if not plan.defined:
         part = _Part(kept=None, words="f or B is not defined at one of its knots")
         return [part.finding(name)]
@@ -68,9 +68,8 @@ def membership(spec: Spec, family: Spec, name: str, effort: Effort | None = None
         point = Plan(tuple(map(constant, knots.x[0])), tuple(map(constant, knots.u[0])), plan.horizon)
         if all(row[0] is ZERO for row in point.defect(model)):  # exactly at rest
             plan = point
-    parts = [*_horizon(plan, spec, family), *_boxes(plan, family, bundle, effort)]
-    parts += _held(plan, family, bundle, effort)
-    parts.append(_defect(plan, model, bundle.defect, effort))
+    parts = [*_horizon(plan, spec, family), *_boxes(plan, family, bundle), *_held(plan, family, bundle)]
+    parts.append(_defect(plan, model, bundle.defect))
     missed = [part.finding(name) for part in parts if not part.kept]
     if missed:
         return missed
@@ -89,21 +88,21 @@ def _horizon(plan: Plan, spec: Spec, family: Spec) -> Iterator[_Part]:
         yield _Part(kept=False, words=words)
 
 
-def _boxes(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator[_Part]:
+def _boxes(plan: Plan, family: Spec, bundle: Bundle) -> Iterator[_Part]:
     """Every state and every input, at both ends of its range."""
     for name, curve, (low, high) in zip(family.states, plan.x, bundle.x, strict=True):
-        yield _stays(f"{name}*", curve, plan, high, effort)
-        yield _stays(f"{name}*", -curve, plan, -low, effort)
+        yield _stays(f"{name}*", curve, plan, high)
+        yield _stays(f"{name}*", -curve, plan, -low)
     for j, (name, (low, high)) in enumerate(zip(family.inputs, bundle.u, strict=True)):
         if plan.knots is None or plan.knots.interpolation == "hermite-simpson":
-            yield _stays(f"{name}*", plan.u[j], plan, high, effort)
-            yield _stays(f"{name}*", -plan.u[j], plan, -low, effort)
+            yield _stays(f"{name}*", plan.u[j], plan, high)
+            yield _stays(f"{name}*", -plan.u[j], plan, -low)
         else:  # held or linear between knots: no further out than at one of them
             yield _at_knots(f"{name}*", plan.knots, plan.horizon, [u[j] for u in plan.knots.u], high)
             yield _at_knots(f"{name}*", plan.knots, plan.horizon, [-u[j] for u in plan.knots.u], -low)
 
 
-def _held(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator[_Part]:
+def _held(plan: Plan, family: Spec, bundle: Bundle) -> Iterator[_Part]:
     """Beside hardware: |u*'| is within its rate; where there is none, u* changes only when a command begins to act."""
     machine, knots, rates = family.hardware, plan.knots, bundle.input_rate
     if machine is None or (len(set(knots.u)) == 1 if knots else not free_symbols(plan.u)):
@@ -120,8 +119,8 @@ def _held(plan: Plan, family: Spec, bundle: Bundle, effort: Effort) -> Iterator[
     else:
         slopes = derivatives(plan.u, TAU if knots else TIME)
         for name, slope, rate in zip(family.inputs, slopes, rates, strict=True):
-            yield _stays(f"{name}*'", slope, plan, rate, effort)
-            yield _stays(f"{name}*'", -slope, plan, rate, effort)
+            yield _stays(f"{name}*'", slope, plan, rate)
+            yield _stays(f"{name}*'", -slope, plan, rate)
 
 
 def _at_knots(
@@ -143,12 +142,12 @@ def _exactly(name: str, most: Fraction, limit: Fraction) -> _Part:
     return _Part(kept=most <= limit, words=words)
 
 
-def _stays(name: str, curve: Expression, plan: Plan, limit: Fraction, effort: Effort) -> _Part:
+def _stays(name: str, curve: Expression, plan: Plan, limit: Fraction) -> _Part:
     """Whether a curve stays below a limit along the plan."""
     if curve.is_constant:
         return _exactly(name, curve.fraction, limit)
     width = _FINE * max(1.0, abs(float(limit)))
-    fine = Effort(gap=_FINE, absolute=width, budget=effort.budget)
+    fine = Effort(gap=_FINE, absolute=width)
     found = supremum(scalar(curve, plan.fixed), plan.domain, fine)
     t = plan.moment(found.at)
     where = "" if t is None else f" at t = {near(t, 4)} s"
@@ -158,14 +157,14 @@ def _stays(name: str, curve: Expression, plan: Plan, limit: Fraction, effort: Ef
     )
 
 
-def _defect(plan: Plan, model: ControlAffineModel, limit: Fraction, effort: Effort) -> _Part:
+def _defect(plan: Plan, model: ControlAffineModel, limit: Fraction) -> _Part:
     p = plan.defect(model)
     if all(row[0] is ZERO for row in p):
         return _Part(kept=True, words="it satisfies the dynamics exactly")
     objective = SumOfNorms([p], plan.fixed)
-    domain = Defect.of(plan, model, 0.0, effort).domain
+    domain = Defect.of(plan, model, 0.0, Effort()).domain
     for gap in _GAPS if limit else _GAPS[:1]:  # of what is not exactly 0 closer bounds tell no more
-        found = supremum(objective, domain, replace(effort, gap=gap, absolute=gap * float(limit) or _FINE))
+        found = supremum(objective, domain, Effort(gap=gap, absolute=gap * float(limit) or _FINE))
         kept = _kept(found, limit)
         if kept is not None:
             break

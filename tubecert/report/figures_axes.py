@@ -111,7 +111,7 @@ class Chart:
         """A curve through points."""
         self.marks.append(Mark(kind="line", parts=_plain([points]), style=style, words=words))
 
-    def area(self, outlines: Sequence[Points], style: str, words: str = "", tip: str = "") -> None:
+    def area(self, outlines: Sequence[Points], style: str, words: str, tip: str = "") -> None:
         """The union of polygons, all in the same sense of rotation."""
         self.marks.append(Mark(kind="area", parts=_plain(outlines), style=style, words=words, tip=tip))
 

@@ -131,10 +131,8 @@ class Ladder:
         """Whether W moves with no more than the degree that is asked for: B is constant."""
         return self._family(0).flat
 
-    def largest_rate(
-        self, limit: float | None, least: Fraction | None = None, sharp: float = _SHARP
-    ) -> VerifiedMetric | None:
-        """A metric of the largest rate with one of condition number up to `limit`, to a factor `sharp`."""
+    def largest_rate(self, limit: float | None, least: Fraction | None = None) -> VerifiedMetric | None:
+        """A metric of the largest rate with one of condition number up to `limit`, to a factor `_SHARP`."""
         best = self._first(limit, least)
         if best is None:
             return None
@@ -145,7 +143,7 @@ class Ladder:
             best = found or best
         if failed is None:
             return best
-        while failed > best.rate * Fraction(sharp):
+        while failed > best.rate * Fraction(_SHARP):
             middle = round_down(sqrt(best.rate * failed), 4)
             if not best.rate < middle < failed:
                 break
