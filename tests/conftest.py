@@ -40,9 +40,8 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 with suppress(AttributeError):  # another C library
     process.keep_memory()  # as commands do
-gc.set_threshold(
-    50_000, 20, 50
-)  # little of what tests make is in cycles, and looking for it costs a twentieth
+# little of what tests make is in cycles, and looking for it costs a twentieth
+gc.set_threshold(50_000, 20, 50)
 gc.disable()  # thousands of tests are collected, and none of them is garbage
 
 

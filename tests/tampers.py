@@ -471,9 +471,8 @@ def structural_campaign(certificate, count, seed, report=None):
         left = [
             change for change in changes if change[0] != "changed" or value_at(result, change[1]) != change[2]
         ]
-        if not all(
-            _harmless_change(certificate["result"], *change) for change in left
-        ):  # a hash is made right again
+        # a hash is made right again
+        if not all(_harmless_change(certificate["result"], *change) for change in left):
             wrong.append(
                 (kind, [(shape(path), str(old)[:40], str(new)[:40]) for _, path, old, new in changes])
             )

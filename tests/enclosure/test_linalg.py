@@ -264,11 +264,8 @@ def lies(honest, rng):
     yield changed(values, np.full_like(honest[values], np.inf))
     yield changed(values, np.zeros_like(honest[values]))
     for k in vectors:
-        for c in (
-            1.1,
-            1 / 1.1,
-            2.0,
-        ):  # vectors of another length, and values such that their product is the matrix
+        # vectors of another length, and values such that their product is the matrix
+        for c in (1.1, 1 / 1.1, 2.0):
             long = list(changed(k, honest[k] * c))
             long[values] = honest[values] / (c if len(vectors) == 2 else c**2)
             yield tuple(long)

@@ -151,9 +151,8 @@ def smaller(stages, number: int, factor: str, what: str):
 @pytest.mark.parametrize("place", ["first", "last"])
 def test_no_number_of_a_claim_is_two_per_cent_smaller(what, place):
     tables, stages, recipe = proven(SWING)
-    number = (
-        1 if place == "first" and len(stages) > 1 else len(stages) - 1
-    )  # zeta is 0 in a stage of sample 0 alone
+    # zeta is 0 in a stage of sample 0 alone
+    number = 1 if place == "first" and len(stages) > 1 else len(stages) - 1
     assert not holds(SWING, tables, smaller(stages, number, "0.98", what), recipe)
 
 

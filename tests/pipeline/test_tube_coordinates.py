@@ -154,9 +154,8 @@ def test_what_the_tube_does_not_reach_need_not_fit(asked):
 def test_what_a_tube_by_radii_reaches_in_coordinates_of_its_own_refutes_nothing():
     tube = "epsilon: 0.6, rho_a: 0.6, coordinates: auto"
     found = certify(load_text(PENDULUM.replace("TUBE", tube)), COARSE)
-    assert (
-        found.verdict is Verdict.UNDECIDED
-    )  # bounds of what it reaches, in coordinates that were searched for
+    # bounds of what it reaches, in coordinates that were searched for
+    assert found.verdict is Verdict.UNDECIDED
     assert isinstance(found.reason.claim, TubeInSafeSet)
     assert found.reason.relax[0].most == pytest.approx(0.4 * np.sqrt(2.4 / 0.3), rel=1e-6)
 

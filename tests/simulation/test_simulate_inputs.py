@@ -50,9 +50,8 @@ def test_random_runs_and_an_adversary_stay_within_what_is_proven(limited, letter
     for comparison in of_all(found):
         (use,) = comparison.went.values()
         assert use.proven[0] <= use.least <= use.greatest <= use.proven[1]
-        assert (
-            own.plan.least.above == own.plan.greatest.above == 0
-        )  # the plan is at rest: u is all of the loop's
+        # the plan is at rest: u is all of the loop's
+        assert own.plan.least.above == own.plan.greatest.above == 0
         assert use.greatest - use.least > 0.05  # and it does something
     told = found.summary("sha256:0")
     assert {name for part in told["loops"] for name in part["went"]} == {"u"}

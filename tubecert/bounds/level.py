@@ -21,10 +21,8 @@ from tubecert.tube import containment
 from tubecert.verdict import Verdict
 
 _ROUNDS = 20
-_LEAST, _MOST = (
-    Fraction(1, 10**7),
-    Fraction(1, 200),
-)  # what is added to be on the safe side: more in each round
+# what is added to be on the safe side: more in each round
+_LEAST, _MOST = (Fraction(1, 10**7), Fraction(1, 200))
 _LOOSE = 1 + Fraction(1, 1000)
 
 

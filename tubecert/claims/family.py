@@ -17,9 +17,8 @@ from tubecert.records import INLINE, Tagged
 from tubecert.verdict import Verdict
 
 Side = Literal["lower", "upper"]
-CONSTANTS: dict[
-    str, tuple[str, str]
-] = {}  # symbol and words of each: `bounds.constants` says what they are called
+# symbol and words of each: `bounds.constants` says what they are called
+CONSTANTS: dict[str, tuple[str, str]] = {}
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))

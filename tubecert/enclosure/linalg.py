@@ -113,9 +113,8 @@ def eigenvalues_midrad(mid: Array, rad: Array) -> Interval:
         return Interval(
             np.nextafter((mid - rad)[..., 0], -np.inf), np.nextafter((mid + rad)[..., 0], np.inf)
         ).sanitised()
-    mid = 0.5 * (
-        mid + np.swapaxes(mid, -1, -2)
-    )  # may move a midpoint by a rounding: covered by _product_error
+    # may move a midpoint by a rounding: covered by _product_error
+    mid = 0.5 * (mid + np.swapaxes(mid, -1, -2))
     bad = ~(finite(mid) & finite(rad))
     safe = np.where(bad[..., None, None], np.eye(mid.shape[-1]), mid)
     d, v = np.linalg.eigh(safe)

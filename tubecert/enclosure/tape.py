@@ -12,9 +12,8 @@ from tubecert.enclosure import lookup
 from tubecert.enclosure.interval import Array, Interval
 from tubecert.expression import Expression, Lookup, topological
 
-Step = tuple[
-    str, int, tuple[int, ...], int
-]  # operation, target slot, argument slots, exponent, index or table
+# operation, target slot, argument slots, exponent, index or table
+Step = tuple[str, int, tuple[int, ...], int]
 
 
 class Tape:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flint import arb
 
 BITS: Final = 300
-_LEFT: Final = Fraction(1, 10**40)  # of the largest slope: what may be left of a function at a root of it
+_LEFT: Final = Fraction(1, 10**40)  # of the largest slope: what a root may leave
 # of the same, squared: rows that depend on each other have a least step, too
 _DAMPED: Final = Fraction(1, 10**20)
 

@@ -40,9 +40,8 @@ def frequencies(h: Iterable[Expression], time: str) -> Frequencies | None:
     for node in topological(roots):
         args = tuple(replaced[arg] for arg in node.args)
         replaced[node] = rebuild(node, args)
-        if node.op in ("sin", "cos", "tan") and time in free_symbols(
-            args
-        ):  # a wave of waves is as long as they are
+        # a wave of waves is as long as they are
+        if node.op in ("sin", "cos", "tan") and time in free_symbols(args):
             slope = derivative(node.args[0], time)
             if slope.is_constant:
                 rational.append(slope.fraction)

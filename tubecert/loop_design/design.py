@@ -89,7 +89,7 @@ def design(plant: Plant, report: Callable[[int, float], None] | None = None) -> 
         raise NoDesign("inputs", j, float(needed[j]), float(plant.room[j]))
     size, moved = settle(own, response.gain, response.ever, MANY)
     (W, U), first = np.split(size * np.r_[s, u], [len(s)]), alone[: len(s)] * s
-    # a tube that narrows after a start has a smaller remainder than at first
+    # one that falls after a start has a smaller remainder than at first
     if moved > STILL and not plant.start.any():
         worst = int(np.argmax(W / first))
         raise NoDesign("no_fixed_point", worst, float(W[worst]), float(first[worst]))

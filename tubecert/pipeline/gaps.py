@@ -37,9 +37,8 @@ _ROUNDS: Final = 12
 _AIM: Final = 0.9  # of what is left to gain
 _MOVED: Final = 0.1  # of what a constant was to come down by: with less, it is as low as it gets
 _SURE: Final = frozenset({"lower", "upper", "initial_distance"})  # close in any case
-_OF_LIMITS: Final = frozenset(
-    {"h", "feedback_gain"}
-)  # what inputs with limits are judged by beside the gains
+# what inputs with limits are judged by beside the gains
+_OF_LIMITS: Final = frozenset({"h", "feedback_gain"})
 
 
 def enclosed(tube: TubeFound) -> Enclosed:

@@ -237,9 +237,8 @@ class SynthesisRun:
         """A row for a metric of this rate; None if there is none."""
         self._keep()
         enough = 0.0 if full else inf if self.limit is None else self.limit
-        any_degree = (
-            full and self.ladder.flat
-        )  # where B moves, so does W: higher degrees are dear, and hardly pay
+        # where B moves, so does W: higher degrees are dear, and hardly pay
+        any_degree = full and self.ladder.flat
         metric = self.ladder.metric(rate, floor, enough, None if any_degree else self.climb.degree)
         if metric is None or (floor == "identity" and not self._allowed(metric)):
             return None

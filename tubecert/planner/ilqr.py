@@ -21,12 +21,8 @@ from tubecert.expression import free_symbols
 from tubecert.expression.matrix import jacobian
 from tubecert.model import TIME, ControlAffineModel
 
-_STAGES = (
-    (0.0, 0.0),
-    (0.5, 0.5),
-    (0.5, 0.5),
-    (1.0, 1.0),
-)  # RK4: time of the stage, share of the slope before
+# RK4: time of the stage, share of the slope before
+_STAGES = ((0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (1.0, 1.0))
 _WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 _ANY = np.zeros(())
 

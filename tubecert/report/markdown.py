@@ -10,9 +10,8 @@ from tubecert.report.html import environment
 from tubecert.report.page import Page, typeset
 
 _SPECIAL = re.compile(r"[\\`*_\[\]<>|~&$]|(?<=\w):(?=//)|(?<=www)\.")
-_AT_START = re.compile(
-    r"(?:#{1,6}|[-+]|\d{1,9}[.)])(?=\s|$)|[-=]+$"
-)  # of a heading, a list, the line below a heading
+# of a heading, a list, the line below a heading
+_AT_START = re.compile(r"(?:#{1,6}|[-+]|\d{1,9}[.)])(?=\s|$)|[-=]+$")
 
 
 def render_page(page: Page) -> str:

@@ -98,10 +98,8 @@ def propose(model: ControlAffineModel, plan: Plan, wish: Wish) -> tuple[Coordina
         # |z| = 1 at the rim of the tube: Gamma, which has a meaning with P = S'S only, is then the same for c W
         S, level = S / level, 1.0
     else:
-        S, level = (
-            S * _reach(S),
-            level * _reach(S),
-        )  # |z| bounds every state, whatever the scale of the metric
+        # |z| bounds every state, whatever the scale of the metric
+        S, level = (S * _reach(S), level * _reach(S))
     coordinates = Coordinates(tuple(tuple(map(_short, row)) for row in S))
     return coordinates, Proposed(rho=_short(level), sides=sides)
 

@@ -109,9 +109,8 @@ class _Put:
         if before in _OWN_NAMES:
             help = suggestion(key, known, what="names in the file") if known else "the file has none there"
             return self._unchanged(node, part, f"unknown name {key} in {before}", help)
-        if (
-            len(self.parts) == 1 and key in names and self.setting.text[0] not in "[{"
-        ):  # a section is no number
+        # a section is no number
+        if len(self.parts) == 1 and key in names and self.setting.text[0] not in "[{":
             help = f"write --set {names[key]}.{key}=..."
             return self._unchanged(node, part, f"{key} is no key of a specification", help)
         if k + 1 < len(self.parts) and self.parts[k + 1][1] is None:

@@ -35,7 +35,7 @@ class Spec:
     units: tuple[tuple[str, str], ...]
     parameters: tuple[tuple[str, Fraction], ...]
     ranges: tuple[tuple[str, Ends], ...] = ()
-    # names alone: expressions have them written out
+    # names: expressions have them written out
     definitions: tuple[str, ...] = field(default=(), compare=False)
     tables: tuple[Lookup, ...] = ()
     f: tuple[Term, ...]

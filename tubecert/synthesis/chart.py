@@ -125,9 +125,8 @@ def control_matrix(order: int, pieces: int) -> Array:
     """Values at the nodes -> Bernstein coefficients on equal pieces of [-1, 1], repeated ends once."""
     rows = []
     for lo, hi in _pieces(pieces):
-        shifted = np.zeros(
-            (order + 1, order + 1)
-        )  # coefficients of s^k from those of u^p, u = lo + (hi - lo) s
+        # coefficients of s^k from those of u^p, u = lo + (hi - lo) s
+        shifted = np.zeros((order + 1, order + 1))
         for p in range(order + 1):
             for k in range(p + 1):
                 shifted[k, p] = comb(p, k) * lo ** (p - k) * (hi - lo) ** k

@@ -116,9 +116,8 @@ def _solutions(
 
     n, m = len(model.states), len(model.inputs)
     slopes = jacobian(functions, model.states)  # d phi_k/dx_l
-    along = [
-        [dot(slopes[k], model.columns[j]) for j in range(m)] for k in range(len(functions))
-    ]  # b_j(phi_k)
+    # b_j(phi_k)
+    along = [[dot(slopes[k], model.columns[j]) for j in range(m)] for k in range(len(functions))]
     flat = [
         *(e for row in along for e in row),
         *functions,

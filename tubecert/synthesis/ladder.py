@@ -304,9 +304,8 @@ class Ladder:
 
     def _problem(self, rate: Fraction, floor: Floor, degree: int, back_off: float) -> SynthesisProblem:
         request = self.request
-        plain = (
-            floor == "identity" and request.coordinates == "identity"
-        )  # then kappa is the condition number
+        # then kappa is the condition number
+        plain = floor == "identity" and request.coordinates == "identity"
         return SynthesisProblem(
             model=request.model,
             safe_set=request.safe_set,

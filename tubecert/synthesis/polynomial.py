@@ -120,9 +120,8 @@ def _charts(problem: SynthesisProblem, N: Matrix) -> tuple[Chart, Chart]:
     """The variables and degrees of W, and of C2."""
     model, family = problem.model, problem.family
     E, f, states = family.frame, model.f, model.states
-    met = [
-        i for i, row in enumerate(N) if any(e is not ZERO for e in row)
-    ]  # rows that N'A and N'E have terms of
+    # rows that N'A and N'E have terms of
+    met = [i for i, row in enumerate(N) if any(e is not ZERO for e in row)]
     A = model.f_x if family.flat else combine(1, multiply(model.f_x, E), -1, along(E, f, states))
     g = (family.functions,)
     rates = [

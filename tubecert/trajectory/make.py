@@ -28,7 +28,8 @@ from tubecert.trajectory.pieces import piecewise_plan
 from tubecert.trajectory.plan import Defect, Plan, family
 
 _SHARE = 1e-3  # of the tube that a planned curve's defect may cost
-MISS = Fraction(1, 1000)  # of 1 + |target|: how far from it a plan may end that is to end in its target
+# |x*(T) - target| may be this much of 1 + |target|, where a plan is to end in its target
+MISS = Fraction(1, 1000)
 _DIGITS = 10**12  # of a root
 
 

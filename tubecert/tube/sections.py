@@ -20,14 +20,8 @@ from tubecert.enclosure.outward import down, up
 from tubecert.expression.matrix import is_positive_semidefinite
 
 Cut = tuple[Array, Array, NDArray[np.bool_]]
-_SHARES = (
-    1e-10,
-    1e-8,
-    1e-6,
-    1e-4,
-    1e-2,
-    0.3,
-)  # of a projection's factor, given away until the rest is proven
+# of a projection's factor, given away until the rest is proven
+_SHARES = (1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 0.3)
 _SLACK = 2e-14  # relative: sums of at most 80 terms, and one difference of them
 _INNER = 1 - 1e-9
 

@@ -231,8 +231,9 @@ class Continuous:
     def _slope(self, stage: int, x: Array) -> Array:
         """f + B(u* + k + h) + E w (n, N) at a stage of the step; what u_a has added to x meanwhile is added here."""
         t = float(self._grid.start[self._step] + SHARES[stage] * self._grid.length[self._step])
+        # (.., 1) if that is one
         plan = Reference(*(part[self._step, _SIDES[stage]] for part in self._grid.plan))
-        if self._plans is not None:  # else there is one for all lanes, (.., 1)
+        if self._plans is not None:
             plan = Reference(*(part[:, self._plans] for part in plan))
         if stage == 0:
             self._B.clear()
