@@ -27,14 +27,16 @@ initial_state: {within: 0.1}
 metric: {rate: 0.4, dual_metric: [[1, -0.5], [-0.5, 1]]}
 tube: {epsilon: 0.2, rho_a: 0.2}
 """
-OWN = FAMILY.split("trajectory: ")[1].split("\n", maxsplit=1)[0]
+
+
+def with_plan(text, plan):
+    """A family with a trajectory in place of its own."""
+    return text.replace(text.split("trajectory: ")[1].split("\n", maxsplit=1)[0], plan)
 
 
 def member(plan):
     """What is found of a plan that is written as a trajectory."""
-    text = FAMILY.replace(OWN, plan).replace(
-        "initial_state: {within: 0.1}\n", "initial_state: {at: [0, 0]}\n"
-    )
+    text = with_plan(FAMILY, plan).replace("{within: 0.1}", "{at: [0, 0]}")
     return membership(load_text(text), load_text(FAMILY), "it")
 
 
@@ -66,7 +68,7 @@ def test_expressions(plan, words):
         assert codes(findings) == IS
 
 
-def table(tmp_path, rows, **keys):
+def table(tmp_path, rows):
     path = tmp_path / "plan.csv"
     path.write_text("t,p,v,u\n" + "".join(",".join(map(str, row)) + "\n" for row in rows))
     return path
@@ -135,8 +137,7 @@ def test_beside_hardware_inputs_move_as_the_family_says(tmp_path, family, at, ho
         rows[1:2] = []
     table(tmp_path, rows)
     own = f"{{kind: csv, file: plan.csv, interpolation: {how}}}"
-    text = MACHINE.replace(MACHINE.split("trajectory: ")[1].split("\n", maxsplit=1)[0], own)
-    text = text.replace("initial_state: {within: 0.1}\n", "")
+    text = with_plan(MACHINE, own).replace("initial_state: {within: 0.1}\n", "")
     (found,) = membership(load_text(text, str(tmp_path / "own.yaml")), load_text(family), "it")
     assert (words or "is a plan of the family") in found.message
     (tmp_path / "any.yaml").write_text(MACHINE)
@@ -148,8 +149,7 @@ def test_beside_hardware_inputs_move_as_the_family_says(tmp_path, family, at, ho
 def test_an_input_that_does_not_change_belongs_whatever_the_plan_does(u, belongs):
     """A formula that moves was refused for a u* that never changes."""
     plan = f'{{kind: expressions, x: ["0.1*sin(t)", "0.1*cos(t)"], u: ["{u}"], horizon: 1}}'
-    old = MACHINE.split("trajectory: ")[1].split("\n", maxsplit=1)[0]
-    text = MACHINE.replace(old, plan).replace("{within: 0.1}", "{at: [0, 0.1]}")
+    text = with_plan(MACHINE, plan).replace("{within: 0.1}", "{at: [0, 0.1]}")
     found = membership(load_text(text), load_text(MACHINE), "it")
     assert any("u* changes while an input is held" in item.message for item in found) != belongs
 
@@ -159,9 +159,7 @@ def test_a_plan_that_goes_on_after_its_horizon_is_proven_no_further(after, belon
     """It moves at t = 1, where the plant would have to stand still: the family has no such plan, and a defect of 0."""
     plan = '{kind: expressions, x: ["0.1*sin(t)", "0.1*cos(t)"], u: ["0*t"], horizon: 1, afterwards: AFTER}'
     family = load_text(RATED.replace("defect: 5", "defect: 0"))
-    text = RATED.replace(
-        RATED.split("trajectory: ")[1].split("\n", maxsplit=1)[0], plan.replace("AFTER", after)
-    )
+    text = with_plan(RATED, plan.replace("AFTER", after))
     own = load_text(text.replace("{within: 0.1}", "{at: [0, 0.1]}"))
     (found,) = membership(own, family, "it")
     assert ("is a plan of the family" in found.message) == belongs
@@ -171,7 +169,7 @@ def test_a_plan_that_goes_on_after_its_horizon_is_proven_no_further(after, belon
 def test_the_last_input_of_a_held_plan_is_not_reached(tmp_path, family):
     table(tmp_path, [(0, 0.5, 0, 0.5), (1, 0.5, 0, 0.5), (2, 0.5, 0, 9)])
     plan = tmp_path / "held.yaml"
-    own = FAMILY.replace(OWN, "{kind: csv, file: plan.csv, interpolation: HOW}")
+    own = with_plan(FAMILY, "{kind: csv, file: plan.csv, interpolation: HOW}")
     own = own.replace("initial_state: {within: 0.1}\n", "")
     plan.write_text(own.replace("HOW", "hold"))
     assert run("check", "--family", family, plan).exit_code == 0
@@ -212,7 +210,7 @@ def test_files_that_do_not_fit_are_told(tmp_path, family):
     assert (done.exit_code, "TC604" in done.output) == (2, True)
     assert run("check", "--family", family, family).exit_code == 2
     single = tmp_path / "one.yaml"
-    single.write_text(FAMILY.replace(OWN, "{kind: equilibrium, at: [0, 0], horizon: 4}"))
+    single.write_text(with_plan(FAMILY, "{kind: equilibrium, at: [0, 0], horizon: 4}"))
     done = run("check", "--family", single, family)
     assert (done.exit_code, "is about one plan" in done.output) == (2, True)
     assert run("check", "--family", tmp_path / "none.json", family).exit_code == 2

@@ -234,9 +234,8 @@ def test_what_parameters_ask_is_told_as_theirs(h, cause):
 
 
 def test_a_wish_for_an_output_is_on_the_first_screen_with_what_was_found():
-    text = sampled.SPEC.replace("f: [v,", "outputs: {tip: p - v/2}, f: [v,").replace(
-        "{p: 0.15}", "{tip: 0.2}"
-    )
+    text = sampled.SPEC.replace("f: [v,", "outputs: {tip: p - v/2}, f: [v,")
+    text = text.replace("{p: 0.15}", "{tip: 0.2}")
     for verbose in (False, True):  # then in the table of what fills them as well
         lines = [own.split() for own in shown(sampled.certificate(text), verbose=verbose).splitlines()]
         found = [own[:4] for own in lines if own[:1] == ["tip"]]
