@@ -15,7 +15,7 @@ from tubecert.errors import SpecError
 from tubecert.model import build
 from tubecert.pipeline.verification import verify
 from tubecert.spec import load
-from tubecert.synthesis.coefficients import with_metric
+from tubecert.synthesis.coefficients import with_metric_file
 from tubecert.verdict import Verdict
 
 SYSTEM = """
@@ -178,9 +178,9 @@ def test_every_format_is_the_same_metric(folder, name):
     spec = load(str(folder / "bent.yaml"), reads="system")
     W = [["1 + 0.25*x**2", "-0.5"], ["-0.5", "2 + 0.125*x**2"]]
     written = {"format": "tubecert-metric/1", "rate": 1, "dual_metric": W}
-    reference = with_metric(spec, str(_json(folder, written, "reference.json")))
+    reference = with_metric_file(spec, str(_json(folder, written, "reference.json")))
     path = WRITERS[name](folder)
-    found = with_metric(spec, str(path), None if "rate" in path.read_text("latin-1") else 1)
+    found = with_metric_file(spec, str(path), None if "rate" in path.read_text("latin-1") else 1)
     assert build(found).W == build(reference).W
     assert found.metric.rate == 1
     assert verify(found, Effort()).verdict is Verdict.CERTIFIED
@@ -189,28 +189,29 @@ def test_every_format_is_the_same_metric(folder, name):
 def test_floats_are_their_shortest_decimals_and_texts_are_exact(folder):
     spec = load(str(folder / "bent.yaml"), reads="system")
     third = _json(folder, {"coefficients": [["1/3", "0"], ["0", 1]], "rate": 0.1})
-    metric = with_metric(spec, str(third)).metric
+    metric = with_metric_file(spec, str(third)).metric
     assert str(metric.dual_metric[0][0].expression.fraction) == "1/3"
     array = _npz(folder, coefficients=np.array([[0.1, 0.0], [0.0, 1.0]]), rate=0.1)
-    assert str(with_metric(spec, str(array)).metric.dual_metric[0][0].expression.fraction) == "1/10"
+    assert str(with_metric_file(spec, str(array)).metric.dual_metric[0][0].expression.fraction) == "1/10"
 
 
 def test_a_csv_of_numbers_alone_is_a_constant_dual_metric(folder):
     spec = load(str(folder / "bent.yaml"), reads="system")
-    found = with_metric(spec, str(_text(folder, "rows.csv", "1e0, -0.5\n-0.5,2\n")), 1)
+    found = with_metric_file(spec, str(_text(folder, "rows.csv", "1e0, -0.5\n-0.5,2\n")), 1)
     rows = [[str(e.expression.fraction) for e in row] for row in found.metric.dual_metric]
     assert rows == [["1", "-1/2"], ["-1/2", "2"]]
     with pytest.raises(SpecError, match="not symmetric"):
-        with_metric(spec, str(_text(folder, "rows.csv", "1,0.5\n-0.5,2\n")), 1)
+        with_metric_file(spec, str(_text(folder, "rows.csv", "1,0.5\n-0.5,2\n")), 1)
 
 
 def test_an_asymmetry_of_rounding_is_mended_and_no_other(folder):
     spec = load(str(folder / "bent.yaml"), reads="system")
     array = np.array([[1.0, -0.5], [-0.5 + 1e-15, 2.0]])
-    W = with_metric(spec, str(_npz(folder, coefficients=array, rate=1.0))).metric.dual_metric
+    W = with_metric_file(spec, str(_npz(folder, coefficients=array, rate=1.0))).metric.dual_metric
     assert W[0][1].expression is W[1][0].expression
+    skew = array + np.array([[0, 0], [1e-6, 0]])
     with pytest.raises(SpecError, match="not symmetric"):
-        with_metric(spec, str(_npz(folder, coefficients=array + np.array([[0, 0], [1e-6, 0]]), rate=1.0)))
+        with_metric_file(spec, str(_npz(folder, coefficients=skew, rate=1.0)))
 
 
 class Bomb:

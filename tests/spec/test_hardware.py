@@ -12,7 +12,7 @@ import tubecert
 from tubecert import pipeline
 from tubecert.errors import SpecError
 from tubecert.spec import Hardware, Setting, canonical, load, load_text
-from tubecert.synthesis.coefficients import with_metric
+from tubecert.synthesis.coefficients import with_metric_file
 
 ROOT = Path(tubecert.__file__).parents[1]
 CONFIGS = sorted((ROOT / "configs").glob("hardware_*.yaml"))
@@ -212,7 +212,7 @@ def test_no_metric_is_put_beside_hardware():
     """Neither a file nor a search: certificates 0, A and B are not about this loop."""
     spec = changed()
     with pytest.raises(SpecError, match="proven without a metric"):
-        with_metric(spec, str(ROOT / "configs/pvtol_adaptation.metric.json"))
+        with_metric_file(spec, str(ROOT / "configs/pvtol_adaptation.metric.json"))
     with pytest.raises(SpecError, match="proven without a metric"):
         pipeline.question_of(spec, pipeline.Options())
 

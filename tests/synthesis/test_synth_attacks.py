@@ -23,7 +23,7 @@ from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.pipeline import Listeners, Options, synthesis, synthesised
 from tubecert.spec import Synthesis, load_text
-from tubecert.synthesis.coefficients import with_metric
+from tubecert.synthesis.coefficients import with_metric_file
 from tubecert.synthesis.diagnose import uncontrollable_mode
 
 QUICK = settings(max_examples=30, deadline=None)
@@ -177,7 +177,7 @@ def test_the_file_says_what_is_true_of_what_it_holds(name, tmp_path):
     target = tmp_path / "m.json"
     file = found.file.to_json()
     target.write_text(json.dumps(file))
-    again = with_metric(spec, str(target))
+    again = with_metric_file(spec, str(target))
     assert build(again).W == build(found.spec).W
     assert again.metric.rate == found.spec.metric.rate
     assert wanted.rate in (None, again.metric.rate)

@@ -22,7 +22,7 @@ from tubecert.metric.verify import verify_metric
 from tubecert.model import build
 from tubecert.spec import load
 from tubecert.synthesis import cegis, sos
-from tubecert.synthesis.coefficients import with_metric
+from tubecert.synthesis.coefficients import with_metric_file
 from tubecert.synthesis.diagnose import is_hurwitz, uncontrollable_mode
 from tubecert.synthesis.family import FamilyError, invariants, metric_family, suggested
 from tubecert.synthesis.ladder import Ladder, Request, routes, shrunk
@@ -277,7 +277,7 @@ def test_the_three_state_metric(tmp_path):
     content = json.loads(target.read_text())
     assert content["condition_number"][1] <= 0.26 / 0.17
     assert content["margin"][0] > 0
-    again = with_metric(load(str(spec)), str(target))
+    again = with_metric_file(load(str(spec)), str(target))
     assert verify_metric(build(again), again.safe_set, Effort()).verdict == "certified"
     certified = run("certify", spec, "--metric", target, "-q", "-o", tmp_path / "c.json")
     assert certified.exit_code == 0, certified.output
@@ -312,7 +312,7 @@ def test_wrong_options_are_located(options, where, words, tmp_path):
 def test_the_shipped_metric_is_proven_where_the_tube_is():
     """On the whole safe set `certify` proves it, which takes half a minute."""
     file = str(ROOT / "configs" / "pvtol_adaptation.metric.json")
-    spec = with_metric(load(str(ROOT / "configs" / "pvtol.yaml")), file)
+    spec = with_metric_file(load(str(ROOT / "configs" / "pvtol.yaml")), file)
     assert spec.metric.rate == Fraction("1.84")
     tube = ((Fraction(-3, 10), Fraction(3, 10)),) * 6
     proof = verify_metric(build(spec), tube, Effort(gap=0.1))

@@ -22,7 +22,7 @@ from tubecert.progress import Phase
 from tubecert.report.findings import render
 from tubecert.report.terminal import Terminal
 from tubecert.spec import Setting, Spec, load
-from tubecert.synthesis.coefficients import with_metric
+from tubecert.synthesis.coefficients import with_metric_file
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -115,7 +115,7 @@ def _cases(
         elif system is None:
             raise _no_system(file)
         else:
-            yield file, metrics.at_rate(with_metric(system, file, rate), rate)
+            yield file, metrics.at_rate(with_metric_file(system, file, rate), rate)
 
 
 def _no_system(file: str) -> TubecertError:

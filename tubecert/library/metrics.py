@@ -160,7 +160,7 @@ def with_metric(spec: Spec, metric: MetricLike, rate: Fraction | None = None) ->
     """
     if not isinstance(metric, _Metric | Mapping):
         path = asking.text_of("metric", metric)
-        return coefficients.with_metric(spec, path, rate), os.path.basename(path)
+        return coefficients.with_metric_file(spec, path, rate), os.path.basename(path)
     whole = metric.text() if isinstance(metric, _Metric) else document_text({"format": FORMAT, **metric})
     return metric_file.with_metric(spec, Source.of(f"<{IN_CODE}>", whole)), IN_CODE
 

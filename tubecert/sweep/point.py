@@ -22,7 +22,7 @@ from tubecert.sampled_loop import record as sampled
 from tubecert.spec import Setting, Spec
 from tubecert.spec.load import load_source
 from tubecert.spec.source import Source
-from tubecert.synthesis.coefficients import with_metric
+from tubecert.synthesis.coefficients import with_metric_file
 
 ERROR_FORMAT: Final = "tubecert-sweep-error/1"
 _KEPT: Final = 256  # proofs that a worker remembers
@@ -43,7 +43,7 @@ class Task:
         """The specification of a point; raises `TubecertError`."""
         spec = load_source(Source.of(self.path, self.text), (*self.fixed, *settings))
         bare = self.options.metric is None or spec.hardware is not None
-        return spec if bare else with_metric(spec, str(self.options.metric))
+        return spec if bare else with_metric_file(spec, str(self.options.metric))
 
     def command(self, settings: tuple[Setting, ...]) -> str:
         """The command that makes the certificate of a point."""

@@ -46,7 +46,7 @@ Content: TypeAlias = Mapping[str, Any]
 Block: TypeAlias = Sequence[Sequence[str]]
 
 
-def with_metric(spec: Spec, path: str, rate: Fraction | None = None) -> Spec:
+def with_metric_file(spec: Spec, path: str, rate: Fraction | None = None) -> Spec:
     """The specification with the metric of a file, also one of coefficients, in place of its own.
 
     `rate` stands in for that of coefficients.
