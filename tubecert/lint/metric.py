@@ -145,8 +145,7 @@ def _declared(spec: Spec, points: Array, W: Array) -> Iterator[Finding]:
 
 def reach_findings(spec: Spec) -> list[Finding]:
     """A combination of states that no input reaches along the plan, and that decays too slowly by itself, or not."""
-    plan = spec.trajectory
-    if plan.task is not None or plan.bundle is not None:
+    if not spec.trajectory.known:
         return []
     model, curve = build(spec), curve_of(spec)
     every = slice(None, None, -(-len(curve.t) // _POINTS))
@@ -173,7 +172,7 @@ def reach_findings(spec: Spec) -> list[Finding]:
     shares /= shares[np.argmax(np.abs(shares))]
     named = {name: float(own) for name, own in zip(spec.states, shares, strict=True) if abs(own) > _ROUNDING}
     what = " + ".join(name if own == 1 else f"{near(own, 3)}*{name}" for name, own in named.items())
-    held = plan.kind == "equilibrium"
+    held = spec.trajectory.kind == "equilibrium"
     decays = value < -_ROUNDING * scale
     speed = f"decays by itself at {near(-value, 4)} 1/s" if decays else "does not decay by itself"
     within = "" if held else "that is the same along the plan "

@@ -57,7 +57,7 @@ def membership(spec: Spec, family: Spec, name: str) -> list[Finding]:
     none, and for a plan that a planner has still to make.
     """
     bundle = family.trajectory.bundle
-    if bundle is None or spec.trajectory.task is not None or spec.trajectory.bundle is not None:
+    if bundle is None or not spec.trajectory.known:
         raise ValueError("a plan is compared with a family of plans")
     model = build(replace(family, metric=None, synthesis=None))
     plan = plan_of(spec, model)
@@ -205,7 +205,7 @@ def member_spec(path: str, family: Spec) -> Spec:
         message = f"{visible(path)} is about another system than the family"
         help = "states, inputs, parameters, f and B must be the same"
         raise SpecError([Finding(code="TC604", message=message, location=spec.location("system"), help=help)])
-    if spec.trajectory.task is not None or spec.trajectory.bundle is not None:
+    if not spec.trajectory.known:
         message = f"{visible(path)} has no plan that could be compared"
         help = "give a plan with its own x and u: expressions, an equilibrium or a CSV file"
         location = spec.location("trajectory.kind")

@@ -212,20 +212,16 @@ class Checked(NamedTuple):
 
 
 def refuted(loop: Loop) -> Checked | None:
-    """Where the plan leaves the safe set, in which its tube must lie, at a time that is looked at; None if nowhere.
-
-    Of a planner's plan and of a family nothing is refuted: there may be others.
-    """
+    """Where a plan that is known leaves the safe set, at a time that is looked at; None if nowhere, or of others."""
     plan = loop.plan
-    if isinstance(plan, Family) or loop.spec.trajectory.task is not None:
+    if isinstance(plan, Family) or not loop.spec.trajectory.known:
         return None
     last = 0.0 if plan.horizon is None else fraction_bounds(plan.horizon)[0]
     knots = () if loop.knots is None else map(float, loop.knots.t)
     t = np.minimum([*np.linspace(0.0, last, _TIMES), *knots], last)
     x, lacks = plan.enclose(t, t)[0], []
-    for name, lo, hi, (least, most) in zip(
-        loop.model.states, x.lo.T, x.hi.T, loop.spec.safe_set, strict=True
-    ):
+    ends = zip(loop.model.states, x.lo.T, x.hi.T, loop.spec.safe_set, strict=True)
+    for name, lo, hi, (least, most) in ends:
         k, j = np.argmin(hi), np.argmax(lo)
         goes, end, at = (hi[k], least, t[k]) if float(hi[k]) < least else (lo[j], most, t[j])
         if float(hi[k]) < least or float(lo[j]) > most:

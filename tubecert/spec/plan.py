@@ -200,6 +200,11 @@ class Trajectory:
         return bool(self.x)
 
     @property
+    def known(self) -> bool:
+        """Whether it is one plan that the file fixes: no family, and nothing that a planner has still to find."""
+        return self.task is None and self.bundle is None
+
+    @property
     def moves(self) -> bool:
         """Whether it is one plan along which x* may move: no point that is held, and no family."""
         return self.kind not in ("equilibrium", "any")

@@ -110,10 +110,7 @@ class Field:
         reserved: Sequence[str] = (),
         named: bool = False,
     ) -> dict[str, Field] | None:
-        """The values of the known keys; unknown, reserved and missing ones are findings.
-
-        `named`: the keys are names that the file itself gives; an unknown one is then compared with these alone.
-        """
+        """The values of the known keys, or of names that the file has `named`; others and missing ones are findings."""
         keys = [*(required or optional)]
         pairs = self.pairs(
             f"with the keys {', '.join(keys[:8])}", ", ".join(f"{key}: ..." for key in keys[:2])

@@ -33,7 +33,7 @@ from tubecert.model import TIME
 from tubecert.spec import Obstacle
 from tubecert.stages.metric import finite
 from tubecert.stages.question import Question, Stopped, stopped
-from tubecert.stages.tube import TubeFound, is_known
+from tubecert.stages.tube import TubeFound
 from tubecert.tube import Tube
 from tubecert.verdict import Verdict
 
@@ -173,7 +173,7 @@ def _limited(enclosed: Enclosed, name: str, limits: tuple[Fraction, Fraction]) -
         limits=limits,
         least=least.printable(),
         greatest=greatest.printable(),
-        any_plan=not is_known(enclosed.question.spec),
+        any_plan=not enclosed.question.spec.trajectory.known,
     )
 
 

@@ -29,7 +29,7 @@ from tubecert.enclosure.constant import Constant, printable_below
 from tubecert.enclosure.interval import Interval, sqrt
 from tubecert.expression import number_text
 from tubecert.records import Json
-from tubecert.spec import Knots, Spec
+from tubecert.spec import Knots
 from tubecert.stages.metric import ProvenMetric
 from tubecert.stages.question import Question, Stopped, stopped
 from tubecert.trajectory import Plan
@@ -203,17 +203,11 @@ def _radii(
     return Fraction(repr(printable_below(left - rho_a))), rho_a
 
 
-def is_known(spec: Spec) -> bool:
-    """Whether the plan is one that the question fixes: neither a planner's nor any of a family."""
-    return spec.trajectory.task is None and spec.trajectory.bundle is None
-
-
 def _leaving(planned: Planned, radius: Radius) -> Stopped:
     """What is claimed of a tube that is not proven to lie in the safe set, and what would fit."""
     contained = radius.contained
-    # in coordinates of its own a tube is bounds of what it reaches, and one of many: that it leaves refutes nothing;
-    # nor that a planner's plan, or a family's box, leaves: the question is about no plan that is known
-    refutes = is_known(planned.question.spec) and (radius.sides is None or contained.outside)
+    # half-widths bound what a tube reaches, one of many; of a plan that is not known there are others, too
+    refutes = planned.question.spec.trajectory.known and (radius.sides is None or contained.outside)
     return stopped(
         planned,
         _claim(radius),
@@ -264,6 +258,5 @@ def _start_outside(planned: Planned) -> Stopped | None:
         return None
     off, name, at = worst
     claim = StartInTube(state=name, off=float(off), half_width=asked[name])
-    known = spec.within is not None or is_known(spec)
-    verdict = Verdict.REFUTED if known else Verdict.UNDECIDED
+    verdict = Verdict.REFUTED if spec.within is not None or spec.trajectory.known else Verdict.UNDECIDED
     return stopped(planned, claim, verdict, where=at, relax=(ReduceInitialError(),))
