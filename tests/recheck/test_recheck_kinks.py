@@ -99,7 +99,7 @@ def test_when_the_time_is_up_the_rest_is_undecided():
     with within(0.0):
         stopped = prove(slopes_below([terms([H], "xyt")], "t", Fraction(15, 1000)), tube(), 10**9)
     assert stopped.boxes <= 8
-    assert stopped.why.endswith("), when the time was up")
+    assert stopped.why.endswith(", when the time was up")
 
 
 def test_a_kink_that_does_not_change_in_time_is_not_looked_at():

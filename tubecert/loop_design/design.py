@@ -240,7 +240,7 @@ class _Search:
             value = np.log(self.counts @ ((W / self.reference) ** 8).sum(axis=1)) / 8
         over = np.maximum(0.0, np.concatenate(used) - ROOM)
         free = FREE * np.log(np.maximum(reached.U[np.isinf(plant.room)], 1e-9)).sum()
-        most, states = (LONG, 1) if plant.magnitude.any() or plant.E.any() else (BRIEF, self.n)
+        most, states = (LONG, 1) if plant.pushed else (BRIEF, self.n)
         forgets = SLOW * np.log(reached.lags) + states * np.log(max(1.0, reached.lags / most))
         return float(value + np.log1p(5 * over + 50 * over**2).sum() + free + forgets)
 

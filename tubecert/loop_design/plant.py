@@ -55,6 +55,11 @@ class Plant:
     remainder: Callable[[Array, Array], Array]
     units: tuple[Array, Array, Array]
 
+    @property
+    def pushed(self) -> bool:
+        """Whether anything acts but noise and the start."""
+        return bool(self.magnitude.any() or self.E.any())
+
 
 def plant_of(remainders: Remainders, narrow: Array) -> Plant:
     """The error equation in floats, with `narrow` (m,) of the room that the inputs have."""
@@ -136,7 +141,7 @@ def in_units(plant: Plant) -> Plant:
     """
     horizon, room = _HORIZON * (plant.sample_time + plant.delay), np.minimum(plant.room, 1 / _QUIET)
     with np.errstate(all="ignore"):
-        for _ in range(_DOUBLED):
+        for _ in range(1 if plant.pushed else _DOUBLED):
             most = np.where(plant.rate > 0, plant.rate * horizon, np.inf)
             turned = np.minimum(plant.magnitude, most)
             a = np.where(turned > 0, turned, 1.0)  # a rate may be what rounding leaves
