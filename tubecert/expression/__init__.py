@@ -1,19 +1,20 @@
 """Exact expressions: text in, hash-consed graph over Fractions out; derivatives by our own rules.
 
-In: text of the specification. Out: `Expression`s and the obligations of their partial operations. Trusted:
-yes.
+In: text of the specification. Out: `Expression`s and the obligations of their partial operations. Trusted: yes.
 
 | module | what it does |
 |---|---|
 | `graph` | the hash-consed graph, exact folding |
 | `calculus` | other variables put in, derivatives |
-| `lookup` | functions given by tables |
+| `lookup` | functions given by tables; slopes of tables that have none |
+| `matrix` | exact operations on matrices: determinant, null space, definiteness, rank |
 | `text` | graph -> text in the grammar of the specification, with the obligations that folding dropped |
 | `scan`, `parse` | text -> graph and obligations, or a located `ExpressionError` |
 | `meant` | which known word a typing error, a word of other formats and languages, or a unit stands for |
-| `balls` | values as balls |
+| `balls` | values as balls; where expressions vanish, as a proposal |
 | `number` | text -> rational number, pi and degrees rounded |
 | `zero` | proves that an expression vanishes identically |
+| `waves` | a common period in t, where one can be seen |
 """
 
 from tubecert.expression.calculus import derivative, derivatives, free_symbols, rebuild, substitute

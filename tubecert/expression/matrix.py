@@ -1,4 +1,4 @@
-"""Matrices of expressions: the few exact operations that the model needs."""
+"""Matrices of expressions and of rationals: the few exact operations that a specification and its model need."""
 
 from __future__ import annotations
 

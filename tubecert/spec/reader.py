@@ -368,9 +368,8 @@ class Field:
         if apart := glued(key.text, known):
             self._at(codes.UNKNOWN_KEY, key, message, apart)
             return [key.text.partition(":")[0]]
-        advice, meant = suggestion(key.text, known, what="known keys"), near(key.text, known)
-        if not named:
-            advice, meant = of_key(key.text, known)
+        own = suggestion(key.text, known, what="known keys"), near(key.text, known)
+        advice, meant = own if named else of_key(key.text, known)
         self._at(codes.UNKNOWN_KEY, key, message, advice)
         return meant
 
