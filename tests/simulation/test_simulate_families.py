@@ -121,7 +121,7 @@ def test_the_certified_loop_keeps_to_every_plan():
 
 @pytest.mark.slow
 def test_an_interruption_keeps_the_plans_that_were_followed(monkeypatch):
-    monkeypatch.setattr("tubecert.simulation.adaptive.campaign.PLANS", 2)
+    monkeypatch.setattr("tubecert.simulation.adaptive.campaign._PLANS", 2)
 
     def interrupted(drawing, seed, numbers):
         yield from members_of(drawing, seed, numbers[:2])
