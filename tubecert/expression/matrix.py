@@ -6,6 +6,7 @@ import random
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import combinations
+from operator import mul
 from typing import TYPE_CHECKING
 
 from tubecert.expression.calculus import derivatives, free_symbols, substitute
@@ -165,14 +166,14 @@ def constants(rows: Rationals) -> Matrix:
 
 def is_positive_definite(a: Rationals) -> bool:
     """Whether a symmetric matrix is positive definite."""
-    return is_positive_semidefinite(a) and not null_space(a)
+    return is_positive_semidefinite(a, definite=True)
 
 
-def is_positive_semidefinite(a: Rationals) -> bool:
-    """Whether a symmetric matrix is positive semidefinite: no pivot is negative, and a zero one has a zero row."""
+def is_positive_semidefinite(a: Rationals, *, definite: bool = False) -> bool:
+    """Whether a symmetric matrix is: no pivot is negative, and a zero one, if not `definite`, has a zero row."""
     rows = [list(row) for row in a]
     for k, row in enumerate(rows):
-        if row[k] < 0 or (row[k] == 0 and any(row[k:])):
+        if row[k] < 0 or (row[k] == 0 and (definite or any(row[k:]))):
             return False
         for below in rows[k + 1 :] if row[k] else []:
             ratio = below[k] / row[k]
@@ -182,8 +183,7 @@ def is_positive_semidefinite(a: Rationals) -> bool:
 
 def dependent_columns(a: Rows) -> bool:
     """Whether the columns are *proven* to be dependent at every point."""
-    entries = [entry for row in a for entry in row]
-    columns = len(a[0])
+    entries, columns = [entry for row in a for entry in row], len(a[0])
     names = sorted(free_symbols(entries))
     generator = random.Random(0)  # noqa: S311 - any points will do, the same in every run
     seen = False
@@ -194,13 +194,13 @@ def dependent_columns(a: Rows) -> bool:
         except ZeroDivisionError:
             continue
         if len(values) == len(entries):
-            if not null_space([values[i : i + columns] for i in range(0, len(values), columns)]):
+            each = [values[k::columns] for k in range(columns)]
+            if is_positive_definite([[sum(map(mul, u, v), start=Fraction(0)) for v in each] for u in each]):
                 return False
             seen = True
     if seen and not names:
         return True
-    few = columns <= _LARGEST_SYMBOLIC
-    return few and is_zero(determinant(multiply(transpose(a), a))) is True
+    return columns <= _LARGEST_SYMBOLIC and is_zero(determinant(multiply(transpose(a), a))) is True
 
 
 def asymmetric_entry(a: Rows, budget: int) -> tuple[int, int, bool] | None:
